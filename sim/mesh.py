@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A polygon mesh of triangles and quads as plain arrays."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """Triangles and quads in one table.
+
+    Attributes
+    ----------
+    vertices : (n, 3) float64, mm
+    faces : (m, 4) int32, corners counter-clockwise seen from outside; a triangle has -1 in the last column
+    uv : (m, 4, 2) float32 or None, texture coordinates per face corner
+    material : (m,) int16 or None, index into the part's material names (`headshop.sim.anatomy.head.MATERIALS`)
+    colour : (n, 3) float32 or None, sRGB colour per vertex, 0..1 (scans)
+    """
+
+    vertices: np.ndarray
+    faces: np.ndarray
+    uv: np.ndarray | None = None
+    material: np.ndarray | None = None
+    colour: np.ndarray | None = None
+
+    @classmethod
+    def from_triangles(cls, vertices, triangles, **more) -> "Mesh":
+        """A mesh of triangles (m, 3)."""
+        triangles = np.asarray(triangles, dtype=np.int32).reshape(-1, 3)
+        faces = np.full((len(triangles), 4), -1, dtype=np.int32)
+        faces[:, :3] = triangles
+        return cls(np.asarray(vertices, dtype=np.float64).reshape(-1, 3), faces, **more)
+
+    @property
+    def triangles(self) -> np.ndarray:
+        """(t, 3) int32: quads split along the diagonal 0-2; the triangles of one quad follow each other."""
+        first = self.faces[:, [0, 1, 2]]
+        quad = self.faces[:, 3] >= 0
+        position = np.arange(len(self.faces)) + np.concatenate(([0], np.cumsum(quad)[:-1])) if len(self.faces) else []
+        out = np.empty((len(self.faces) + int(quad.sum()), 3), dtype=np.int32)
+        out[position] = first
+        out[np.asarray(position)[quad] + 1] = self.faces[quad][:, [0, 2, 3]]
+        return out
+
+    def moved(self, vertices: np.ndarray) -> "Mesh":
+        """The same mesh with other vertex positions (n, 3)."""
+        vertices = np.asarray(vertices, dtype=np.float64)
+        if vertices.shape != self.vertices.shape:
+            raise ValueError(f"a mesh of {len(self.vertices)} vertices cannot take positions of shape {vertices.shape}")
+        return replace(self, vertices=vertices)
+
+
+def vertex_normals(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """(n, 3) unit normals, area-weighted; zero where a vertex has no triangle."""
+    a, b, c = (vertices[triangles[:, k]] for k in range(3))
+    normal = np.cross(b - a, c - a)
+    out = np.empty_like(vertices)
+    for axis in range(3):
+        out[:, axis] = np.bincount(triangles.ravel(), np.repeat(normal[:, axis], 3), minlength=len(vertices))
+    length = np.linalg.norm(out, axis=1, keepdims=True)
+    return out / np.where(length > 0, length, 1)
+
+
+def edges(faces: np.ndarray) -> np.ndarray:
+    """(e, 2) int32 unique undirected edges of a face table (triangles: -1 in the last column, or three columns)."""
+    faces = np.asarray(faces)
+    if faces.shape[1] == 3:
+        pairs = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    else:
+        quad = faces[:, 3] >= 0
+        tri, four = faces[~quad], faces[quad]
+        pairs = np.concatenate(
+            [tri[:, [0, 1]], tri[:, [1, 2]], tri[:, [2, 0]]]
+            + [four[:, [0, 1]], four[:, [1, 2]], four[:, [2, 3]], four[:, [3, 0]]]
+        )
+    return np.unique(np.sort(pairs, axis=1), axis=0).astype(np.int32)
+
+
+def surface_points(vertices: np.ndarray, corners: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """(k, 3) points from vertex indices (k, 3) and barycentric weights (k, 3)."""
+    return np.einsum("kij,ki->kj", vertices[corners], weights)
