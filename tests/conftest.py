@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Fixtures for all rooms: Blender (or a visible skip), a clean scene before each test that uses it, shared test data."""
+
+import os
+import shutil
+import sys
+import tempfile
+from pathlib import Path
+
+import pytest
+
+_SETTINGS = pytest.StashKey[str]()
+
+
+def pytest_configure(config):
+    """Blender must not see the user's own settings and extensions: their wheels would shadow this environment's."""
+    folder = tempfile.mkdtemp(prefix="headshop-tests-")
+    config.stash[_SETTINGS] = folder
+    os.environ["BLENDER_USER_RESOURCES"] = folder
+
+
+def pytest_unconfigure(config):
+    shutil.rmtree(config.stash.get(_SETTINGS, ""), ignore_errors=True)
+
+
+def _empty_scene(bpy):
+    """An empty file; the add-on stays as it is (`read_factory_settings` would disable it)."""
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+
+
+@pytest.fixture(scope="session")
+def blender():
+    """The bpy module for the whole session; skips where it is not installed."""
+    return pytest.importorskip("bpy", reason="bpy (Blender as a Python module) is not installed")
+
+
+@pytest.fixture
+def bpy(blender):
+    """The bpy module with an empty scene; skips where it is not installed."""
+    _empty_scene(blender)
+    return blender
+
+
+@pytest.fixture(autouse=True)
+def _leave_no_scene_behind():
+    """Tests that touched Blender leave an empty scene; tests of `sim` never import it."""
+    yield
+    if "bpy" in sys.modules and sys.modules["bpy"].data.filepath + "".join(sys.modules["bpy"].data.objects.keys()):
+        _empty_scene(sys.modules["bpy"])
+
+
+@pytest.fixture(scope="session")
+def shared() -> Path:
+    """The folder of scans and measurements beside the checkout (or $HEADSHOP_SHARED); skips where it is absent."""
+    folder = Path(os.environ.get("HEADSHOP_SHARED") or Path(__file__).resolve().parents[2] / "shared")
+    if not (folder / "scans").is_dir():
+        pytest.skip(f"no test data at {folder}: set HEADSHOP_SHARED to run this test")
+    return folder
+
+
+@pytest.fixture(scope="session")
+def reference():
+    """The reference head; skips while its file has not been generated."""
+    from headshop.sim.anatomy import storage
+
+    if not storage.REFERENCE.is_file():
+        pytest.skip(
+            f"{storage.REFERENCE.name} is not there: run python -m headshop.assets.generators.make_reference_head"
+        )
+    return storage.load_head()
