@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Fixtures for all rooms: Blender (or a visible skip), a clean scene before each test that uses it, shared test data."""
+"""Fixtures for all rooms: Blender (or a visible skip), a clean scene for each test, shared test data."""
 
 import os
 import shutil
@@ -45,8 +45,9 @@ def bpy(blender):
 def _leave_no_scene_behind():
     """Tests that touched Blender leave an empty scene; tests of `sim` never import it."""
     yield
-    if "bpy" in sys.modules and sys.modules["bpy"].data.filepath + "".join(sys.modules["bpy"].data.objects.keys()):
-        _empty_scene(sys.modules["bpy"])
+    blender = sys.modules.get("bpy")
+    if blender is not None and (blender.data.filepath or len(blender.data.objects)):
+        _empty_scene(blender)
 
 
 @pytest.fixture(scope="session")
@@ -64,7 +65,5 @@ def reference():
     from headshop.sim.anatomy import storage
 
     if not storage.REFERENCE.is_file():
-        pytest.skip(
-            f"{storage.REFERENCE.name} is not there: run python -m headshop.assets.generators.make_reference_head"
-        )
+        pytest.skip(f"no {storage.REFERENCE.name}: run python -m headshop.assets.generators.make_reference_head")
     return storage.load_head()
