@@ -38,10 +38,10 @@ class Mesh:
         """(t, 3) int32: quads split along the diagonal 0-2; the triangles of one quad follow each other."""
         first = self.faces[:, [0, 1, 2]]
         quad = self.faces[:, 3] >= 0
-        position = np.arange(len(self.faces)) + np.concatenate(([0], np.cumsum(quad)[:-1])) if len(self.faces) else []
+        position = np.arange(len(self.faces)) + np.cumsum(quad) - quad
         out = np.empty((len(self.faces) + int(quad.sum()), 3), dtype=np.int32)
         out[position] = first
-        out[np.asarray(position)[quad] + 1] = self.faces[quad][:, [0, 2, 3]]
+        out[position[quad] + 1] = self.faces[quad][:, [0, 2, 3]]
         return out
 
     def moved(self, vertices: np.ndarray) -> "Mesh":

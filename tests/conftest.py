@@ -67,3 +67,32 @@ def reference():
     if not storage.REFERENCE.is_file():
         pytest.skip(f"no {storage.REFERENCE.name}: run python -m headshop.assets.generators.make_reference_head")
     return storage.load_head()
+
+
+@pytest.fixture
+def bad_scan(tmp_path):
+    """``bad_scan(kind)`` -> path of a file; kinds: empty, text, missing, truncated, points, nan, one_triangle, whole."""
+    import numpy as np
+    from headshop.sim.mesh import Mesh
+    from headshop.sim.scan.ply import write_ply
+
+    def make(kind: str) -> Path:
+        path = tmp_path / f"{kind}.ply"
+        if kind == "empty":
+            path.write_bytes(b"")
+        elif kind == "text":
+            path.write_text("Dear scanner,\nthis is a letter, not a scan.\n")
+        elif kind != "missing":
+            side = np.arange(20.0) * 10
+            points = np.stack([*np.meshgrid(side, side), 30 * np.cos(side / 40)[:, None] * np.cos(side / 40)], axis=-1)
+            corner = np.arange(400).reshape(20, 20)
+            faces = np.stack([corner[:-1, :-1], corner[:-1, 1:], corner[1:, 1:], corner[1:, :-1]], axis=-1)
+            points, faces = points.reshape(-1, 3), faces.reshape(-1, 4)
+            points = points * np.nan if kind == "nan" else points
+            faces = {"points": faces[:0], "one_triangle": np.array([[0, 1, 20, -1]])}.get(kind, faces)
+            write_ply(path, Mesh(points, faces.astype(np.int32)))
+            if kind == "truncated":
+                path.write_bytes(path.read_bytes()[:-1000])
+        return path
+
+    return make

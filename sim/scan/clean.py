@@ -1,0 +1,165 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a raw scan must lose before anything can be computed on it, and nothing more: holes and specks stay."""
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from ..errors import InputError
+from ..mesh import Mesh
+
+#: Fewer triangles than this are no head.
+FEWEST_TRIANGLES = 100
+#: More than this would not fit the memory of an ordinary machine.
+MOST_TRIANGLES = 40_000_000
+#: A triangle is a line when its height is below this part of its longest edge.
+FLAT = 1e-7
+
+
+def clean_scan(mesh: Mesh) -> tuple[Mesh, dict]:
+    """A triangle mesh without NaN vertices, zero-area and duplicate faces and unused vertices; coincident ones welded.
+
+    Returns the mesh (colours kept: the mean of those welded) and counts: ``vertices``, ``triangles``, ``components`` of
+    the result, and what was removed: ``nonfinite_vertices``, ``nonfinite_faces``, ``welded_vertices``,
+    ``zero_area_faces``, ``duplicate_faces``, ``unused_vertices``.
+
+    Raises
+    ------
+    InputError : nothing usable is there: no faces, too few, too many, all NaN, all in one point or plane.
+    """
+    points, triangles = mesh.vertices, mesh.triangles
+    _refuse_hopeless(points, triangles)
+    counts = {}
+    finite = np.isfinite(points).all(axis=1)
+    counts["nonfinite_vertices"] = int((~finite).sum())
+    if not finite.any():
+        raise InputError("No vertex of the scan has a position (all are NaN): export the scan again.")
+    usable = finite[triangles].all(axis=1)
+    counts["nonfinite_faces"] = int((~usable).sum())
+    triangles = triangles[usable]
+    extent = np.ptp(points[finite], axis=0).max()
+    if not 0 < extent < 1e12:
+        raise InputError(f"The scan measures {extent:g} units across, which is no head in any unit: check the export.")
+
+    kept = np.zeros(len(points), dtype=bool)
+    kept[triangles.ravel()] = True
+    counts["unused_vertices"] = int((finite & ~kept).sum())
+    index = np.cumsum(kept) - 1
+    points, triangles = points[kept], index[triangles]
+    colour = None if mesh.colour is None else mesh.colour[kept]
+
+    same, count = _coincident(points)
+    counts["welded_vertices"] = len(points) - count
+    points, colour = _merged(points, colour, same, count)
+    triangles = same[triangles]
+
+    flat = _flat(points, triangles)
+    counts["zero_area_faces"] = int(flat.sum())
+    triangles = triangles[~flat]
+    again = _repeated(triangles, len(points))
+    counts["duplicate_faces"] = int(again.sum())
+    triangles = triangles[~again]
+
+    kept = np.zeros(len(points), dtype=bool)
+    kept[triangles.ravel()] = True
+    counts["unused_vertices"] += int((~kept).sum())
+    triangles = (np.cumsum(kept) - 1)[triangles]
+    points, colour = points[kept], None if colour is None else colour[kept]
+    if len(triangles) < FEWEST_TRIANGLES:
+        raise InputError(
+            f"Only {len(triangles)} usable triangles are left of the scan, too few for a head: choose another file."
+        )
+    _refuse_flat(points)
+    counts |= {
+        "vertices": len(points),
+        "triangles": len(triangles),
+        "components": components(triangles, len(points))[0],
+    }
+    return replace(Mesh.from_triangles(points, triangles), colour=colour), counts
+
+
+def components(triangles: np.ndarray, vertex_count: int) -> tuple[int, np.ndarray]:
+    """How many separate pieces triangles (m, 3) form, and the piece (vertex_count,) of each vertex."""
+    a, b = triangles[:, [0, 1]].ravel(), triangles[:, [1, 2]].ravel()
+    graph = coo_matrix((np.ones(len(a), dtype=np.int8), (a, b)), shape=(vertex_count, vertex_count))
+    _, label = connected_components(graph, directed=False)
+    used = np.unique(label[triangles[:, 0]])
+    return len(used), label
+
+
+def _refuse_hopeless(points, triangles):
+    if len(points) == 0:
+        raise InputError("The scan has no vertices: choose another file, or export it again.")
+    if len(triangles) == 0:
+        raise InputError(
+            f"The scan has {len(points)} points but no faces: make a mesh of the points (the scanner's software can)."
+        )
+    if len(triangles) < FEWEST_TRIANGLES:
+        raise InputError(
+            f"The scan has {len(triangles)} triangle{'s' if len(triangles) > 1 else ''}, too few for a head: choose "
+            "another file, or export it with more detail."
+        )
+    if len(triangles) > MOST_TRIANGLES:
+        raise InputError(
+            f"The scan has {len(triangles)} triangles, more than memory allows: reduce it to {MOST_TRIANGLES} or fewer."
+        )
+    if triangles.min() < 0 or triangles.max() >= len(points):
+        raise InputError("The scan is damaged, a face names a vertex that does not exist: export it again.")
+
+
+def _refuse_flat(points):
+    centred = points - points.mean(axis=0)
+    spread = np.sqrt(np.maximum(np.linalg.eigvalsh(centred.T @ centred / len(points)), 0))
+    if spread[0] < 1e-4 * spread[2]:
+        raise InputError("The scan is flat, all its points lie in one plane: choose the scan of a head.")
+
+
+def _coincident(points):
+    """Vertices in exactly one place: the new index of each (n,) and how many there are.
+
+    UV seams, STL triangles and merged sheets repeat positions bit by bit. One sort of a 64-bit mix of the coordinates
+    is far faster than sorting rows; neighbours in it are then compared for real.
+    """
+    bits = (points + 0.0).view(np.uint64)  # + 0.0 turns -0 into 0
+    key = np.zeros(len(points), dtype=np.uint64)
+    for axis in range(3):
+        key ^= bits[:, axis]
+        key *= np.uint64(0x9E3779B97F4A7C15)
+        key ^= key >> np.uint64(29)
+    order = np.argsort(key, kind="stable")
+    new = np.ones(len(points), dtype=bool)
+    new[1:] = (points[order[1:]] != points[order[:-1]]).any(axis=1)
+    first = order[np.maximum.accumulate(np.where(new, np.arange(len(points)), 0))]  # the first vertex of each place
+    leader = np.empty(len(points), dtype=np.int64)
+    leader[order] = first
+    own = leader == np.arange(len(points))
+    return (np.cumsum(own) - 1)[leader], int(own.sum())
+
+
+def _merged(points, colour, same, count):
+    out = np.empty((count, 3))
+    out[same] = points
+    if colour is None:
+        return out, None
+    share = np.bincount(same, minlength=count)
+    mean = np.stack([np.bincount(same, colour[:, k], minlength=count) / share for k in range(3)], axis=1)
+    return out, mean.astype(np.float32)
+
+
+def _flat(points, triangles):
+    a, b, c = (points[triangles[:, k]] for k in range(3))
+    ab, ac, bc = b - a, c - a, c - b
+    longest = np.maximum.reduce([np.einsum("ij,ij->i", e, e) for e in (ab, ac, bc)])
+    return np.linalg.norm(np.cross(ab, ac), axis=1) <= FLAT * longest
+
+
+def _repeated(triangles, vertex_count):
+    """True for each triangle whose three corners were seen before, in any order."""
+    low, mid, high = np.sort(triangles, axis=1).T.astype(np.int64)
+    order = np.lexsort((high, low * vertex_count + mid))
+    rows = np.stack([low, mid, high], axis=1)[order]
+    again = np.zeros(len(triangles), dtype=bool)
+    again[order[1:]] = (rows[1:] == rows[:-1]).all(axis=1)
+    return again
