@@ -1,0 +1,174 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Scan files to arrays: PLY by our own reader, everything else through Blender's importers in a scene of its own.
+
+Blender's PLY importer accepts truncated files without a word, so PLY does not go through it. The current scene, its
+selection and all datablocks are left as they were.
+"""
+
+import struct
+from contextlib import contextmanager
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from ..sim.errors import InputError
+from ..sim.mesh import Mesh
+from ..sim.scan.ply import read_ply
+from . import bridge
+from .quiet import quiet
+
+# Files of no stated axes (OBJ, STL) come in unturned: landmarks are given in the file's own axes.
+_RAW_AXES = {"forward_axis": "Y", "up_axis": "Z"}
+
+
+def _import_obj(path):
+    bpy.ops.wm.obj_import(filepath=path, **_RAW_AXES)
+
+
+def _import_stl(path):
+    bpy.ops.wm.stl_import(filepath=path, **_RAW_AXES)
+
+
+def _import_gltf(path):
+    if not hasattr(bpy.types, "IMPORT_SCENE_OT_gltf"):
+        raise InputError(
+            "Blender's glTF add-on is off: switch it on in Preferences, Add-ons, or convert the scan to PLY."
+        )
+    bpy.ops.import_scene.gltf(filepath=path)
+
+
+def _import_usd(path):
+    bpy.ops.wm.usd_import(filepath=path, set_frame_range=False, import_cameras=False, import_lights=False)
+
+
+def _import_fbx(path):
+    bpy.ops.wm.fbx_import(filepath=path)
+
+
+_IMPORTERS = {
+    ".obj": _import_obj,
+    ".stl": _import_stl,
+    **dict.fromkeys((".glb", ".gltf"), _import_gltf),
+    **dict.fromkeys((".usd", ".usda", ".usdc", ".usdz"), _import_usd),
+    ".fbx": _import_fbx,
+}
+EXTENSIONS = (".ply", *_IMPORTERS)
+
+
+def check_file(path) -> Path:
+    """The path, if a scan may be there: it exists, is a file with something in it, and of a kind that is read.
+
+    Raises
+    ------
+    InputError : it is not.
+    """
+    path = Path(path)
+    if path.is_dir():
+        raise InputError(f"{path} is a folder: give the scan file in it.")
+    if not path.is_file():
+        raise InputError(f"There is no file {path}: check the name of the scan.")
+    if path.suffix.lower() not in EXTENSIONS:
+        kinds = ", ".join(extension[1:].upper() for extension in EXTENSIONS)
+        raise InputError(f"{path.name} is not of a kind that is read ({kinds}): export the scan as one of them.")
+    if path.stat().st_size == 0:
+        raise InputError(f"{path} is empty (0 bytes): export the scan again.")
+    return path
+
+
+def read_scan(path) -> Mesh:
+    """All meshes of a scan file as one, in the file's own units and axes (glTF, USD and FBX: in metres, Z up).
+
+    Raises
+    ------
+    InputError : missing, empty, truncated, of an unknown kind, not what its name says, or without faces.
+    """
+    path = check_file(path)
+    extension = path.suffix.lower()
+    if extension == ".ply":
+        return read_ply(path)
+    _check_length(path, extension)
+    with _scratch_scene() as scene:
+        with quiet() as printed:
+            try:
+                _IMPORTERS[extension](str(path.resolve()))
+            except RuntimeError as error:
+                raise InputError(
+                    f"{path} cannot be read as {extension[1:].upper()} ({_reason(error, printed())}): export the scan again."
+                ) from error
+        meshes = _meshes_of(scene)
+    if not meshes:
+        raise InputError(f"{path} holds no mesh that can be read as {extension[1:].upper()}: export the scan again.")
+    return joined(meshes)
+
+
+def _check_length(path: Path, extension: str) -> None:
+    """Refuse binary STL and GLB files that are shorter than their headers say; Blender reads what is left of them."""
+    size = path.stat().st_size
+    with path.open("rb") as stream:
+        start = stream.read(84)
+    wanted = size
+    if extension == ".stl" and not start.lstrip().startswith(b"solid"):
+        wanted = 84 + 50 * struct.unpack_from("<I", start, 80)[0] if len(start) == 84 else 84
+    elif extension == ".glb":
+        wanted = struct.unpack_from("<I", start, 8)[0] if start[:4] == b"glTF" and len(start) >= 12 else 12
+        if start[:4] != b"glTF":
+            raise InputError(f"{path} is not a GLB file although it is named so: export the scan again.")
+    if size < wanted:
+        raise InputError(f"{path} is cut off: it has {size} bytes of {wanted}; copy or export the scan again.")
+
+
+def _reason(error: Exception, printed: str) -> str:
+    """The last thing said about an error, without Blender's prefixes."""
+    lines = [line.strip() for line in f"{printed}\n{error}".splitlines() if line.strip()]
+    said = next((line for line in reversed(lines) if "rror" in line), lines[-1] if lines else "no reason given")
+    return said.rpartition("Error: ")[2].rstrip(".").strip()[:160]
+
+
+@contextmanager
+def _scratch_scene():
+    """A scene of its own as the context's, and after it every datablock that appeared is removed."""
+    before = _datablocks()
+    scene = bpy.data.scenes.new("Head Shop import")
+    try:
+        with bpy.context.temp_override(scene=scene, view_layer=scene.view_layers[0], collection=scene.collection):
+            yield scene
+    finally:
+        bpy.data.batch_remove(_datablocks() - before)
+
+
+def _datablocks() -> set:
+    return {
+        block
+        for prop in bpy.data.bl_rna.properties
+        if prop.type == "COLLECTION" and isinstance(prop.fixed_type, bpy.types.bpy_struct)
+        for block in getattr(bpy.data, prop.identifier)
+        if isinstance(block, bpy.types.ID)
+    }
+
+
+def _meshes_of(scene) -> list[Mesh]:
+    """Every mesh object of the scene with its transforms applied, in Blender's units as they are."""
+    graph = scene.view_layers[0].depsgraph
+    graph.update()
+    meshes = []
+    for obj in scene.objects:
+        if obj.type == "MESH" and len(obj.data.polygons):
+            mesh = bridge.object_to_mesh(obj)
+            matrix = np.array(obj.evaluated_get(graph).matrix_world)
+            points = mesh.vertices * bridge.METRES
+            meshes.append(mesh.moved(points @ matrix[:3, :3].T + matrix[:3, 3]))
+    return meshes
+
+
+def joined(meshes: list[Mesh]) -> Mesh:
+    """Several meshes as one; colours are kept if any has them (white where there are none), UVs and materials are not."""
+    offsets = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
+    faces = [np.where(m.faces >= 0, m.faces + offset, -1) for m, offset in zip(meshes, offsets, strict=False)]
+    colour = None
+    if any(mesh.colour is not None for mesh in meshes):
+        white = [np.ones((len(m.vertices), 3), np.float32) if m.colour is None else m.colour for m in meshes]
+        colour = np.concatenate(white)
+    return Mesh(
+        np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(faces).astype(np.int32), colour=colour
+    )
