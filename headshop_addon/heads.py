@@ -157,7 +157,7 @@ def read_head(skin: bpy.types.Object) -> Head:
     absent = [part for part in PARTS if part not in objects]
     if absent:
         raise InputError(
-            f"The head {skin.name!r} has lost its {', '.join(absent)}: undo the deletion, or append the whole head again."
+            f"The head {skin.name!r} has lost its {', '.join(absent)}: undo the deletion or append the head again."
         )
     parts = {part: _read_part(skin, obj) for part, obj in objects.items()}
     groups = {name: weights for name, weights in bridge.read_groups(skin).items() if name in SKIN_GROUPS}

@@ -93,8 +93,9 @@ def read_scan(path) -> Mesh:
             try:
                 _IMPORTERS[extension](str(path.resolve()))
             except RuntimeError as error:
+                reason = _reason(error, printed())
                 raise InputError(
-                    f"{path} cannot be read as {extension[1:].upper()} ({_reason(error, printed())}): export the scan again."
+                    f"{path} cannot be read as {extension[1:].upper()} ({reason}): export the scan again."
                 ) from error
         meshes = _meshes_of(scene)
     if not meshes:
@@ -162,7 +163,7 @@ def _meshes_of(scene) -> list[Mesh]:
 
 
 def joined(meshes: list[Mesh]) -> Mesh:
-    """Several meshes as one; colours are kept if any has them (white where there are none), UVs and materials are not."""
+    """Several meshes as one; colours are kept if any has them (white elsewhere), UVs and materials are not."""
     offsets = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
     faces = [np.where(m.faces >= 0, m.faces + offset, -1) for m, offset in zip(meshes, offsets, strict=False)]
     colour = None
