@@ -176,13 +176,18 @@ def _read_part(skin, obj):
             f"{obj.name!r} has {len(mesh.vertices)} vertices instead of {expected}: its mesh may be reshaped but not "
             "be given other vertices; undo that or build the head again."
         )
-    if obj == skin:
-        return mesh
-    # relative to the skin without asking the dependency graph, which may not have run yet
-    matrix = np.array(obj.matrix_parent_inverse @ obj.matrix_basis)
-    if np.allclose(matrix, np.eye(4), atol=1e-9):
+    matrix = placement(skin, obj)
+    if np.array_equal(matrix, np.eye(4)):
         return mesh
     return mesh.moved(mesh.vertices @ matrix[:3, :3].T + matrix[:3, 3] / bridge.METRES)
+
+
+def placement(skin: bpy.types.Object, obj: bpy.types.Object) -> np.ndarray:
+    """(4, 4) from a part's local space to the skin's, in metres; the identity unless an artist moved the part."""
+    if obj == skin:
+        return np.eye(4)
+    # not matrix_world: the dependency graph may not have run yet
+    return np.array(obj.matrix_parent_inverse @ obj.matrix_basis, dtype=float)
 
 
 def write_report(skin: bpy.types.Object, report: dict) -> None:

@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Bakes by name: a set of poses, a performance file, or the keyed sliders, with the head's report kept up to date."""
+
+import bpy
+
+from ..sim.acting import expressions
+from ..sim.errors import InputError
+from ..sim.progress import Work, portion
+from . import heads, performance, pipeline, shape_keys
+
+
+def poses_of_set(skin: bpy.types.Object, name: str) -> dict:
+    """Pose name -> Pose of the set ``expressions`` or ``muscles``.
+
+    Raises
+    ------
+    InputError : there is no such set.
+    """
+    if name == "expressions":
+        return expressions.expressions()
+    if name == "muscles":
+        return expressions.muscle_poses(heads.read_head(skin))
+    raise InputError(f"The set {name} is not in this version: bake --set muscles or --set expressions.")
+
+
+def bake(skin: bpy.types.Object, pose_set: str | None = None, acted=None) -> Work:
+    """Bake a set of poses, a performance (`sim.acting.performance`), or both; returns the head's whole report.
+
+    A performance sets the scene's frame rate and range to its own.
+    """
+    report = heads.read_report(skin)
+    seconds = dict(report.get("seconds", {}))
+    border = 1.0 if acted is None else 0.5
+    shapes = acting = None
+    if pose_set is not None:
+        with pipeline.timed(seconds, f"bake_{pose_set}"):
+            shapes = yield from portion(shape_keys.bake_poses(skin, poses_of_set(skin, pose_set)), 0.0, border)
+    if acted is not None:
+        with pipeline.timed(seconds, "bake_performance"):
+            acting = yield from portion(bake_acted(skin, acted), 0.0 if pose_set is None else border, 1.0)
+    if shapes is not None:
+        report["shapes"] = shape_keys.baked_report(skin)
+    if acting is not None:
+        report["performance"] = acting
+    report["seconds"] = seconds
+    report["versions"] = pipeline.versions()
+    heads.write_report(skin, report)
+    return report
+
+
+def bake_acted(skin: bpy.types.Object, acted, scene: bpy.types.Scene | None = None) -> Work:
+    """Bake a performance from frame 1 on, at its own frame rate, which becomes the scene's."""
+    scene = scene or bpy.context.scene
+    poses = acted.poses()
+    report = yield from performance.bake_performance(skin, poses)
+    scene.render.fps, scene.render.fps_base = round(acted.fps), round(acted.fps) / acted.fps
+    scene.frame_start, scene.frame_end = 1, max(len(poses), 1)
+    return report
+
+
+def summary(report: dict) -> str:
+    """A sentence of what was baked."""
+    said = []
+    if report.get("shapes"):
+        worst = max(shape["penetration_mm"] for shape in report["shapes"].values())
+        settled = sum(shape["converged"] for shape in report["shapes"].values())
+        said.append(f"{len(report['shapes'])} shapes ({settled} at rest, deepest penetration {worst:.2f} mm)")
+    if report.get("performance"):
+        acting = report["performance"]
+        said.append(f"{acting['frames']} frames in {acting['keys'].get('skin', 0)} shape keys of the skin")
+    return ", ".join(said)

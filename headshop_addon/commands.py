@@ -1,0 +1,230 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What each command of the command line does. Inputs and outputs are checked before Blender is started.
+
+Every function takes the parsed options; `InputError` means that the user is told and nothing was written.
+"""
+
+from pathlib import Path
+
+from ..sim.errors import InputError
+from ..sim.progress import finish
+from .outputs import Outputs
+from .progress_bar import progress_bar
+
+#: File extensions each command writes.
+_BLEND, _PICTURES, _ENGINES = (".blend",), (".png", ".mp4"), (".glb", ".fbx", ".usdc")
+
+
+def version() -> None:
+    """Print the versions of what a head is made with."""
+    _start_blender()
+    from .pipeline import versions
+
+    print("  ".join(f"{name} {number}" for name, number in versions().items()))
+
+
+def build(options) -> None:
+    """Scan and landmarks to a head in a .blend, with plain files if asked for."""
+    from ..sim.adapt.landmarks import read_landmarks
+
+    _require_file(options.scan, "scan")
+    _require_kind(options.output, _BLEND)
+    if options.landmarks is None:
+        raise InputError(_NO_AUTOMATIC)
+    landmarks = read_landmarks(options.landmarks)
+    with Outputs() as outputs:
+        blend = outputs.file(options.output)
+        plain = _plain_folder(outputs, options)
+        _start_blender()
+        from . import pipeline
+
+        scan = pipeline.load_scan(options.scan, landmarks, options.units, options.up)
+        landmarks = scan.orientation.turn(landmarks)
+        name = options.name or Path(options.scan).stem
+        skin, report = _run(pipeline.build(scan, landmarks, name), options)
+        _dress(skin)
+        _save(blend)
+        _write_plain(skin, plain, outputs)
+    if not options.quiet:
+        fit, sizes = report["fit"], report["scan"]
+        print(f"{options.output}: {name}, {sizes['triangles']} triangles, fitted to {fit['mean_mm']:.3f} mm on average")
+
+
+def landmarks(options) -> None:
+    """Automatic landmarks: not yet."""
+    _require_file(options.scan, "scan")
+    raise InputError(_NO_AUTOMATIC)
+
+
+_NO_AUTOMATIC = (
+    "Landmarks are not found automatically in this version: give a file of four or more to headshop build --landmarks, "
+    "or click them on the scan in Blender."
+)
+
+
+def bake(options) -> None:
+    """Poses or a performance to shape keys."""
+    _require_head_file(options.head)
+    if options.poses is None and options.performance is None:
+        raise InputError("There is nothing to bake: give --set muscles, --set expressions or --performance FILE.")
+    if options.poses in ("facs", "arkit"):
+        raise InputError(f"The set {options.poses} is not in this version: bake --set muscles or --set expressions.")
+    output = options.output or options.head
+    _require_kind(output, _BLEND)
+    performance = None
+    if options.performance is not None:
+        from ..sim.acting.performance import read_performance
+
+        performance = read_performance(options.performance)
+    with Outputs() as outputs:
+        blend = outputs.file(output)
+        plain = _plain_folder(outputs, options)
+        skin = _open(options)
+        from . import baking
+
+        report = _run(baking.bake(skin, options.poses, performance), options)
+        _save(blend)
+        _write_plain(skin, plain, outputs)
+    if not options.quiet:
+        print(f"{output}: {baking.summary(report)}")
+
+
+def render(options) -> None:
+    """A contact sheet or a movie."""
+    _require_head_file(options.head)
+    kind = _require_kind(options.output, _PICTURES)
+    with Outputs() as outputs:
+        picture = outputs.file(options.output)
+        skin = _open(options)
+        if kind == ".png":
+            from .contact_sheet import render_sheet as render_it
+        else:
+            from .movie import render_movie as render_it
+        _run(render_it(skin, picture), options)
+    if not options.quiet:
+        print(options.output)
+
+
+def export(options) -> None:
+    """An engine-ready copy."""
+    _require_head_file(options.head)
+    _require_kind(options.output, _ENGINES)
+    with Outputs() as outputs:
+        copy = outputs.file(options.output)
+        skin = _open(options)
+        from .export import export_head
+
+        names = export_head(skin, copy)
+    if not options.quiet:
+        print(f"{options.output}: {len(names)} shapes")
+
+
+def sample(options) -> None:
+    """The embedded sample subject as plain files; needs no Blender."""
+    from ..sim.scan.sample import make_sample
+    from .sample_files import FILES, write_sample
+
+    with Outputs() as outputs:
+        folder = outputs.folder(options.output, FILES)
+        subject = _run(make_sample(**({} if options.seed is None else {"seed": options.seed})), options)
+        write_sample(subject, folder)
+    if not options.quiet:
+        print(f"{options.output}: {', '.join(FILES)}")
+
+
+def _require_file(path, what: str) -> None:
+    if not Path(path).is_file():
+        found = "is a folder" if Path(path).is_dir() else "is not there"
+        raise InputError(f"The {what} {path} {found}: check the name.")
+
+
+def _require_head_file(path) -> None:
+    _require_file(path, "head")
+    if Path(path).stat().st_size == 0:
+        raise InputError(f"{path} is empty (0 bytes): build the head again.")
+
+
+def _require_kind(path, kinds) -> str:
+    kind = Path(path).suffix.lower()
+    if kind not in kinds:
+        raise InputError(f"The output {path} must end in {' or '.join(kinds)}: rename it.")
+    return kind
+
+
+def _start_blender() -> None:
+    """Make Blender's module ready with an empty scene.
+
+    Raises
+    ------
+    InputError : it is not installed.
+    """
+    try:
+        import bpy
+    except ModuleNotFoundError as error:
+        raise InputError(
+            "Blender's module is not installed here: run pip install bpy==5.0.1 (Python 3.11) or bpy==5.2.3 (Python "
+            "3.13), or use blender --command headshop."
+        ) from error
+    from .quiet import quiet
+
+    with quiet():
+        bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+
+
+def _open(options):
+    """Open the .blend without running its scripts; returns the skin of its head."""
+    _start_blender()
+    import bpy
+
+    from . import pipeline
+    from .quiet import quiet
+
+    path = Path(options.head).resolve()
+    with quiet():
+        try:
+            bpy.ops.wm.open_mainfile(filepath=str(path), load_ui=False, use_scripts=False)
+        except RuntimeError as error:
+            raise InputError(
+                f"{options.head} is not a .blend file that can be opened: build the head again."
+            ) from error
+    return pipeline.only_head(name=options.name)
+
+
+def _save(path: Path) -> None:
+    import bpy
+
+    from .quiet import quiet
+
+    with quiet():
+        bpy.ops.wm.save_as_mainfile(filepath=str(path.resolve()), check_existing=False, compress=True, copy=True)
+
+
+def _run(work, options):
+    with progress_bar(not options.quiet) as show:
+        return finish(work, show)
+
+
+def _dress(skin) -> None:
+    """Materials, lights and camera, so that the file opens as a picture."""
+    import bpy
+
+    from .materials import dress_head
+    from .stage import set_stage
+
+    dress_head(skin)
+    set_stage(bpy.context.scene, skin)
+
+
+def _plain_folder(outputs: Outputs, options):
+    if options.export is None:
+        return None
+    from .plain_files import FILES
+
+    return outputs.folder(options.export, FILES)
+
+
+def _write_plain(skin, folder, outputs: Outputs) -> None:
+    if folder is not None:
+        from .plain_export import write_plain
+
+        write_plain(skin, folder)

@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Files that appear whole or not at all: written under temporary names, renamed together when everything is done."""
+
+import os
+import shutil
+import tempfile
+from pathlib import Path
+
+from ..sim.errors import InputError
+
+
+class Outputs:
+    """Use as ``with Outputs() as outputs``; leaving it by any exception, Ctrl-C included, removes what was begun.
+
+    Folders that had to be made for an output go too if it does not come about.
+    """
+
+    def __init__(self):
+        self._renames: list[tuple[Path, Path]] = []
+        self._scratch: list[Path] = []
+        self._made: list[Path] = []
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, kind, error, trace):
+        try:
+            if kind is None:
+                for temporary, final in self._renames:
+                    if temporary.exists():
+                        os.replace(temporary, final)
+                    else:
+                        final.unlink(missing_ok=True)
+                self._made.clear()
+        finally:
+            for scratch in self._scratch:
+                shutil.rmtree(scratch, ignore_errors=True)
+            for folder in reversed(self._made):
+                try:
+                    folder.rmdir()
+                except OSError:
+                    pass  # somebody else put something there meanwhile
+        return False
+
+    def file(self, path) -> Path:
+        """A path to write to instead of ``path``, which it becomes in the end: same name, in a hidden folder beside it.
+
+        Raises
+        ------
+        InputError : nothing can be written there, or it is a folder.
+        """
+        path = Path(path)
+        if path.is_dir():
+            raise InputError(f"{path} is a folder: give the name of a file to write.")
+        scratch = self._scratch_beside(path)
+        if path.exists() and not os.access(path, os.W_OK):
+            raise InputError(f"{path} is write-protected: give another output.")
+        self._renames.append((scratch / path.name, path))
+        return scratch / path.name
+
+    def folder(self, path, names) -> Path:
+        """A folder to write files into instead of ``path``, to which they move in the end.
+
+        ``names`` are all that can be written: of those, what is not written this time is removed from ``path``, so
+        that no file of an earlier run stands among the new ones.
+        """
+        path = Path(path)
+        if path.exists() and not path.is_dir():
+            raise InputError(f"{path} is a file: give a folder to write to.")
+        scratch = self._scratch_beside(path / "any")
+        self._renames += [(scratch / name, path / name) for name in names]
+        return scratch
+
+    def _scratch_beside(self, path: Path) -> Path:
+        folder = path.parent
+        try:
+            self._make(folder)
+            scratch = Path(tempfile.mkdtemp(prefix=".headshop-", dir=folder))
+        except OSError as error:
+            why = error.strerror or error
+            raise InputError(f"Nothing can be written to {folder} ({why}): give another output.") from None
+        self._scratch.append(scratch)
+        return scratch
+
+    def _make(self, folder: Path):
+        missing = []
+        while not folder.exists():
+            missing.append(folder)
+            folder = folder.parent
+        for each in reversed(missing):
+            each.mkdir()
+            self._made.append(each)

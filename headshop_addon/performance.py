@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A performance over time: every frame simulated, then kept as a few principal shape keys with F-curves.
+
+What is written plays without the extension: relative shape keys and one slotted action, nothing else.
+"""
+
+import json
+
+import bpy
+import numpy as np
+
+from ..sim.acting.pose import CONTROLS, Pose, control
+from ..sim.acting.principal import principal_shapes
+from ..sim.progress import Progress, Work
+from ..sim.tissue.model import build_model
+from ..sim.tissue.posing import posed_parts
+from ..sim.tissue.solver import rest_state, solve
+from . import bridge, heads, shape_keys
+from .slotted_actions import animate_keys, curves_of, new_action, stop_keys
+
+PERFORMANCE = "headshop_performance"
+TOLERANCE = 0.001  # mm that the principal shape keys may differ from the simulation
+_PATHS = {"headshop.muscles.": "muscles", "headshop.controls.": "controls"}
+
+
+def is_keyed(skin: bpy.types.Object) -> bool:
+    """Whether any muscle or control slider of the head has F-curves."""
+    return any(path.startswith(start) for path in curves_of(skin) for start in _PATHS)
+
+
+def keyed_poses(skin: bpy.types.Object, frames) -> list[Pose]:
+    """The poses that the sliders' F-curves say at ``frames``; sliders without keys keep the value they have."""
+    curves = curves_of(skin)
+    values: dict[str, dict[str, np.ndarray]] = {}
+    for start, group in _PATHS.items():
+        still = getattr(getattr(skin, "headshop", None), group, None)
+        values[group] = {name: np.full(len(frames), value) for name, value in (still.values() if still else {}).items()}
+        for path, curve in curves.items():
+            if path.startswith(start):
+                values[group][path[len(start) :]] = np.array([curve.evaluate(frame) for frame in frames])
+    return [
+        Pose(
+            muscles={name: float(v[k]) for name, v in values["muscles"].items() if v[k]},
+            **{name: float(v[k]) for name, v in values["controls"].items() if name in CONTROLS},
+        )
+        for k in range(len(frames))
+    ]
+
+
+def bake_performance(
+    skin: bpy.types.Object, poses: list[Pose], first_frame: int = 1, name: str = "Performance"
+) -> Work:
+    """Simulate ``poses``, one a frame from ``first_frame`` on, into animated shape keys; returns a report.
+
+    Each frame starts from the one before. The report holds ``frames``, ``converged`` (frames), ``keys`` (part ->
+    count), ``error_mm`` (of the compression) and ``peak_mm``. Nothing is written before all is simulated. An earlier
+    performance of the head is replaced; its other shape keys stay.
+
+    Raises
+    ------
+    InputError : not a whole head, or linked from another file.
+    """
+    shape_keys.require_editable(skin)
+    yield Progress(0.0, "Building the tissue")
+    head = heads.read_head(skin)
+    model = build_model(head)
+    state = rest_state(model)
+    neutral = posed_parts(model, state, control(model, Pose()))
+    motion = {part: np.empty((len(poses), *points.shape), dtype=np.float32) for part, points in neutral.items()}
+    converged = 0
+    for number, pose in enumerate(poses):
+        yield Progress(0.05 + 0.9 * number / len(poses), f"Simulating frame {number + 1} of {len(poses)}")
+        asked = control(model, pose)
+        solution = solve(model, asked, state, max_iterations=shape_keys.ITERATIONS)
+        state = solution.state
+        converged += bool(solution.converged)
+        for part, points in posed_parts(model, state, asked).items():
+            motion[part][number] = points - neutral[part]
+    yield Progress(0.96, "Compressing")
+    found = {p: principal_shapes(m, TOLERANCE) for p, m in motion.items() if np.abs(m).max(initial=0.0) > TOLERANCE}
+    yield Progress(1.0, "Writing shape keys")
+    write_performance(skin, found, np.arange(first_frame, first_frame + len(poses)), name)
+    return {
+        "frames": len(poses),
+        "converged": converged,
+        "keys": {part: len(each.shapes) for part, each in found.items()},
+        "error_mm": max((each.error for each in found.values()), default=0.0),
+        "peak_mm": float(np.linalg.norm(motion["skin"], axis=2).max(initial=0.0)),
+    }
+
+
+def write_performance(skin, found: dict, frames: np.ndarray, name: str) -> None:
+    """Store part -> `Principal` as shape keys of each part and one action with a slot for each."""
+    remove_performance(skin)
+    action = new_action(f"{heads.head_name(skin)} {name}")
+    for part, obj in heads.parts_of(skin).items():
+        if part not in found:
+            continue
+        basis, turn = bridge.read_positions(obj), np.linalg.inv(heads.placement(skin, obj)[:3, :3]).T
+        weights = {}
+        for number, shape in enumerate(found[part].shapes):
+            block = bridge.ensure_shape_key(obj, _free_name(obj, f"{name} {number + 1:02d}"))
+            block.slider_min, block.slider_max = -1.0, 1.0
+            bridge.write_positions(obj, basis + shape @ turn, block.name)
+            weights[block.name] = found[part].weights[:, number]
+        obj[PERFORMANCE] = json.dumps(list(weights))
+        animate_keys(action, obj.data.shape_keys, frames, weights)
+    if not len(action.slots):
+        bpy.data.actions.remove(action)  # nothing moves
+    settings = getattr(skin, "headshop", None)
+    if settings is not None:
+        settings.live = False  # else the sliders would move the face a second time
+
+
+def _free_name(obj, name: str) -> str:
+    keys = obj.data.shape_keys
+    while keys is not None and name in keys.key_blocks:
+        name += "'"
+    return name
+
+
+def remove_performance(skin: bpy.types.Object) -> None:
+    """Take a baked performance off a head."""
+    for obj in heads.parts_of(skin).values():
+        names = json.loads(obj.get(PERFORMANCE, "[]"))
+        if obj.data.shape_keys is not None:
+            stop_keys(obj.data.shape_keys)
+        shape_keys.remove_keys(obj, names)
+        if PERFORMANCE in obj:
+            del obj[PERFORMANCE]

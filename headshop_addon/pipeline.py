@@ -1,0 +1,169 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""From a scan file and landmarks to a head in the scene: the one path that operators and the command line share."""
+
+import platform
+import time
+import tomllib
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import bpy
+import numpy as np
+import scipy
+
+from ..sim.adapt.build import build_head
+from ..sim.anatomy.storage import load_head
+from ..sim.errors import InputError
+from ..sim.mesh import Mesh
+from ..sim.progress import Progress, Work, portion
+from ..sim.scan.clean import clean_scan
+from ..sim.scan.orientation import Orientation, detect
+from . import bridge, heads
+from .scan_import import read_scan
+
+
+@dataclass(frozen=True, eq=False)
+class Scan:
+    """A cleaned scan in mm, Z up, face toward -Y.
+
+    orientation : how points of its file got there
+    report : the ``scan`` block of ``report.json``
+    """
+
+    mesh: Mesh
+    orientation: Orientation
+    report: dict = field(default_factory=dict)
+    seconds: dict = field(default_factory=dict)
+
+
+@contextmanager
+def timed(seconds: dict, stage: str):
+    """Add the seconds spent inside to ``seconds[stage]``."""
+    start = time.perf_counter()
+    try:
+        yield
+    finally:
+        seconds[stage] = round(seconds.get(stage, 0.0) + time.perf_counter() - start, 3)
+
+
+def versions() -> dict[str, str]:
+    """What made a head: versions of Head Shop, Blender, Python, numpy and scipy."""
+    return {
+        "headshop": own_version(),
+        "blender": bpy.app.version_string,
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+        "scipy": scipy.__version__,
+    }
+
+
+def own_version() -> str:
+    """The version in the extension's manifest."""
+    manifest = Path(__file__).resolve().parents[1] / "blender_manifest.toml"
+    return tomllib.loads(manifest.read_text(encoding="utf-8"))["version"]
+
+
+def load_scan(path, landmarks: dict | None = None, unit: str | None = None, up: str | None = None) -> Scan:
+    """Read, clean and turn upright a scan file.
+
+    landmarks : name -> (3,) mm along the file's own axes; they help to find the axes, see `Orientation.turn`
+    unit, up : override what is detected: a name in `orientation.UNITS`, an axis such as ``+Y``
+
+    Raises
+    ------
+    InputError : the file cannot be read or is no head (`scan_import`, `sim.scan.clean`, `sim.scan.orientation`).
+    """
+    seconds: dict[str, float] = {}
+    with timed(seconds, "read"):
+        raw = read_scan(path)
+    with timed(seconds, "clean"):
+        return prepare_scan(raw, landmarks, unit, up, seconds)
+
+
+def prepare_scan(raw: Mesh, landmarks=None, unit=None, up=None, seconds=None) -> Scan:
+    """Clean a mesh in any unit and axes and bring it to mm, Z up, face toward -Y; see `load_scan`."""
+    mesh, counts = clean_scan(raw)
+    found = detect(mesh, landmarks, unit=unit, up=up)
+    report = counts | {
+        "unit": found.unit,
+        "unit_scale": found.unit_scale,
+        "up": found.up,
+        "front": found.front,
+        "certain": bool(found.certain),
+        "orientation": found.reason,
+    }
+    return Scan(mesh.moved(found.apply(mesh.vertices)), found, report, {} if seconds is None else seconds)
+
+
+def add_scan(scan: Scan, name: str, scene: bpy.types.Scene | None = None) -> bpy.types.Object:
+    """Put a scan into the scene as an object at the origin, in metres."""
+    obj = bridge.mesh_to_object(scan.mesh, name)
+    obj[heads.PART] = "scan"
+    (scene or bpy.context.scene).collection.objects.link(obj)
+    return obj
+
+
+def build(
+    scan: Scan,
+    landmarks: dict[str, np.ndarray],
+    name: str,
+    scan_object: bpy.types.Object | None = None,
+    scene: bpy.types.Scene | None = None,
+) -> Work:
+    """Fit the reference head to ``scan`` and put it into the scene; returns (skin object, report).
+
+    ``landmarks`` are in the scan's place (mm). Nothing is added to the scene before all is computed, so closing the
+    generator leaves it as it was.
+
+    Raises
+    ------
+    InputError : the landmarks do not fit the scan (`sim.adapt`).
+    """
+    seconds = dict(scan.seconds)
+    with timed(seconds, "fit"):
+        yield Progress(0.0, "Reading the reference head")
+        reference = load_head()
+        result = yield from portion(build_head(reference, scan.mesh, landmarks), 0.02, 0.95)
+    yield Progress(0.95, "Placing the head")
+    report = {
+        "scan": scan.report,
+        "fit": result.fit,
+        "anatomy": result.anatomy,
+        "landmarks_missing": list(result.landmarks_missing),
+        "seconds": seconds,
+        "versions": versions(),
+    }
+    with timed(seconds, "place"):
+        created = scan_object is None
+        if created:
+            scan_object = add_scan(scan, f"{name} Scan", scene)
+        collection = heads.create_head(
+            result.head, name, scan_object, scene=scene, attributes=getattr(result, "attributes", None)
+        )
+        if created:  # it lives with its head
+            (scene or bpy.context.scene).collection.objects.unlink(scan_object)
+            scan_object.hide_viewport = True
+        skin = next(obj for obj in collection.objects if heads.is_skin(obj))
+    heads.write_report(skin, report)
+    return skin, report
+
+
+def only_head(scene: bpy.types.Scene | None = None, name: str | None = None) -> bpy.types.Object:
+    """The skin of the scene's head; ``name`` chooses among several.
+
+    Raises
+    ------
+    InputError : there is none, several, or none of that name.
+    """
+    found = heads.find_heads(scene)
+    names = [heads.head_name(skin) for skin in found]
+    if name is not None:
+        found = [skin for skin, known in zip(found, names, strict=True) if known == name]
+        if not found:
+            raise InputError(f"There is no head {name!r} in the file (there is {', '.join(names) or 'none'}).")
+    if not found:
+        raise InputError("There is no head in the file: build one from a scan first.")
+    if len(found) > 1:
+        raise InputError(f"The file holds several heads ({', '.join(names)}): choose one with --head.")
+    return found[0]

@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A head as plain files for programs that have no Blender: meshes as PLY, the rest as JSON, shapes as ``.npz``.
+
+All in mm, Z up, face toward -Y, in the scan's own place; the skin is the cage without subdivision, in triangles.
+"""
+
+import io
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from ..sim.adapt.landmarks import write_landmarks
+from ..sim.anatomy.head import Head
+from ..sim.anatomy.storage import write_atomically
+from ..sim.mesh import Mesh
+from ..sim.scan.ply import write_ply
+from . import bridge, heads, shape_keys
+from .plain_files import muscles_document, write_json
+
+
+def write_plain(skin: bpy.types.Object, folder) -> None:
+    """Write the head into ``folder`` (which exists): the files of `plain_files.FILES`, shapes only if any were baked.
+
+    Raises
+    ------
+    InputError : not a whole head (`heads.read_head`).
+    """
+    folder = Path(folder)
+    head = heads.read_head(skin)
+    report = heads.read_report(skin)
+    for part in ("skin", "skull", "mandible"):
+        mesh = head.parts[part]
+        write_ply(folder / f"{part}.ply", Mesh.from_triangles(mesh.vertices, mesh.triangles))
+    write_landmarks(folder / "landmarks.json", head.landmark_positions(), report.get("landmarks_missing", ()))
+    write_landmarks(folder / "skull_landmarks.json", head.skull_landmark_positions())
+    write_json(folder / "muscles.json", muscles_document(head))
+    write_json(folder / "report.json", report)
+    shapes = shapes_arrays(skin, head)
+    if len(shapes["names"]):
+        stream = io.BytesIO()
+        np.savez_compressed(stream, **shapes)
+        write_atomically(folder / "shapes.npz", stream.getvalue())
+
+
+def shapes_arrays(skin: bpy.types.Object, head: Head) -> dict[str, np.ndarray]:
+    """``names`` (k,), ``basis`` (n, 3), ``deltas`` (k, n, 3) in mm and ``triangles`` (m, 3) of the baked shapes."""
+    names = shape_keys.baked_names(skin)
+    basis = head.skin.vertices
+    deltas = [bridge.read_positions(skin, name) - basis for name in names]
+    return {
+        "names": np.array(names, dtype=str),
+        "basis": basis,
+        "deltas": np.array(deltas, dtype=np.float32).reshape(len(names), len(basis), 3),
+        "triangles": head.skin.triangles,
+    }

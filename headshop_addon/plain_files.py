@@ -1,0 +1,31 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The plain files of an export folder: their names, and those of them that are JSON."""
+
+import json
+
+from ..sim.anatomy.head import Head
+from ..sim.anatomy.storage import write_atomically
+
+#: Everything an export folder may hold; ``shapes.npz`` only once something was baked.
+FILES = (
+    *("skin.ply", "skull.ply", "mandible.ply", "landmarks.json", "skull_landmarks.json", "muscles.json"),
+    *("report.json", "shapes.npz"),
+)
+
+
+def muscles_document(head: Head) -> dict:
+    """Muscle name -> {type, origin, points, width}: its fixed end, its middle line from there on, its width; mm."""
+    return {
+        m.name: {
+            "type": m.kind,
+            "origin": m.path[0].round(4).tolist(),
+            "points": m.path.round(4).tolist(),
+            "width": float(m.width),
+        }
+        for m in head.muscles
+    }
+
+
+def write_json(path, document) -> None:
+    """Write JSON, whole or not at all."""
+    write_atomically(path, (json.dumps(document, indent=1) + "\n").encode())

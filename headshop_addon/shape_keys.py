@@ -1,0 +1,151 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Simulated poses as ordinary relative shape keys that play without the extension.
+
+The skin gets one key a pose; the jaw's parts, teeth, tongue and eyes get a key of the same name wherever they move,
+whose value follows the skin's through a driver without Python. Keys an artist made are never touched; which ones are
+ours is written on each object in ``headshop_shapes``.
+"""
+
+import json
+
+import bpy
+import numpy as np
+
+from ..sim.acting.pose import Pose, control
+from ..sim.errors import InputError
+from ..sim.progress import Progress, Work
+from ..sim.tissue.model import build_model
+from ..sim.tissue.posing import posed_parts
+from ..sim.tissue.solver import rest_state, solve
+from . import bridge, heads
+
+SHAPES = "headshop_shapes"
+ITERATIONS = 300  # until it rests, not until it looks right
+STILL = 0.001  # mm: a part that moves less gets no key
+
+
+def bake_poses(skin: bpy.types.Object, poses: dict[str, Pose]) -> Work:
+    """Simulate each pose until it rests and store it as a shape key; returns name -> report.
+
+    A report holds ``peak_mm``, ``volume_drift``, ``penetration_mm`` and ``converged``. Nothing is written before all
+    poses are simulated: closing the generator leaves the head as it was.
+
+    Raises
+    ------
+    InputError : not a whole head, linked from another file, or the artist has a key of his own by one of the names.
+    """
+    require_editable(skin)
+    _refuse_foreign(skin, poses)
+    yield Progress(0.0, "Building the tissue")
+    head = heads.read_head(skin)
+    model = build_model(head)
+    neutral = posed_parts(model, rest_state(model), control(model, Pose()))
+    shapes, report = {}, {}
+    for number, (name, pose) in enumerate(poses.items()):
+        yield Progress(0.1 + 0.9 * number / len(poses), f"Simulating {name}")
+        asked = control(model, pose)
+        solution = solve(model, asked, max_iterations=ITERATIONS)  # from rest: a key must not depend on its neighbours
+        posed = posed_parts(model, solution.state, asked)
+        shapes[name] = {part: posed[part] - neutral[part] for part in posed}
+        report[name] = _report(solution, shapes[name]["skin"])
+    yield Progress(1.0, "Writing shape keys")
+    write_shapes(skin, shapes, report)
+    return report
+
+
+def _report(solution, delta: np.ndarray) -> dict:
+    found = solution.diagnostics
+    return {
+        "peak_mm": round(float(np.linalg.norm(delta, axis=1).max()), 4),
+        "volume_drift": round(float(found["volume_drift"]), 6),
+        "penetration_mm": round(float(found["penetration_mm"]), 4),
+        "converged": bool(solution.converged),
+    }
+
+
+def require_editable(skin: bpy.types.Object) -> None:
+    """Raise `InputError` if the head is linked: its meshes cannot take shape keys."""
+    linked = [obj.name for obj in heads.parts_of(skin).values() if obj.data.library is not None]
+    if linked:
+        name = heads.head_name(skin)
+        raise InputError(f"The meshes of {name!r} are linked from another file: make them local, or bake in that file.")
+
+
+def baked_names(obj: bpy.types.Object) -> list[str]:
+    """The shape keys of an object that a bake made, in the order of the object's keys."""
+    keys = obj.data.shape_keys
+    ours = baked_report(obj)
+    return [block.name for block in keys.key_blocks if block.name in ours] if keys else []
+
+
+def baked_report(obj: bpy.types.Object) -> dict[str, dict]:
+    """Name of each baked shape -> its report."""
+    try:
+        return json.loads(obj.get(SHAPES, "{}"))
+    except (ValueError, TypeError):
+        return {}
+
+
+def _refuse_foreign(skin, names) -> None:
+    keys = skin.data.shape_keys
+    foreign = [n for n in names if keys and n in keys.key_blocks and n not in baked_report(skin)]
+    if foreign:
+        raise InputError(
+            f"{skin.name!r} has a shape key {foreign[0]!r} of your own, which a bake would replace: rename it first."
+        )
+
+
+def write_shapes(skin: bpy.types.Object, shapes: dict[str, dict[str, np.ndarray]], report: dict[str, dict]) -> None:
+    """Store name -> part -> displacements (n, 3) mm as shape keys with drivers, in place of ours of the same names."""
+    parts = heads.parts_of(skin)
+    for part, obj in parts.items():
+        moving = {
+            name: deltas[part]
+            for name, deltas in shapes.items()
+            if part == "skin" or (part in deltas and np.abs(deltas[part]).max() > STILL)
+        }
+        ours = baked_report(obj)
+        remove_keys(obj, [name for name in shapes if name in ours and name not in moving])
+        basis = bridge.read_positions(obj)
+        turn = np.linalg.inv(heads.placement(skin, obj)[:3, :3]).T  # a part may have been moved on the skin
+        for name, delta in moving.items():
+            block = bridge.ensure_shape_key(obj, name)
+            bridge.write_positions(obj, basis + delta @ turn, name)
+            if part != "skin":
+                follow(block, skin.data.shape_keys, name)
+        kept = {name: value for name, value in ours.items() if name not in shapes}
+        if moving or ours:
+            obj[SHAPES] = json.dumps(kept | {name: report.get(name, {}) for name in moving})
+
+
+def remove_keys(obj: bpy.types.Object, names) -> None:
+    """Take shape keys away, with their drivers and what is noted about them."""
+    keys = obj.data.shape_keys
+    there = [name for name in names if keys is not None and name in keys.key_blocks]
+    for name in there:
+        block = keys.key_blocks[name]
+        block.driver_remove("value")
+        obj.shape_key_remove(block)
+    ours = {name: value for name, value in baked_report(obj).items() if name not in names}
+    if SHAPES in obj:
+        obj[SHAPES] = json.dumps(ours)
+    if there and len(keys.key_blocks) == 1:
+        obj.shape_key_remove(keys.key_blocks[0])
+
+
+def remove_baked(skin: bpy.types.Object) -> None:
+    """Take all baked shape keys off a head; the artist's own stay."""
+    for obj in heads.parts_of(skin).values():
+        remove_keys(obj, baked_names(obj))
+
+
+def follow(block: bpy.types.ShapeKey, keys: bpy.types.Key, name: str) -> None:
+    """Drive a key's value by the value of ``keys``' key ``name`` (a sum of one variable: no Python is run)."""
+    block.driver_remove("value")
+    driver = block.driver_add("value").driver
+    driver.type = "SUM"
+    variable = driver.variables.new()
+    variable.type = "SINGLE_PROP"
+    target = variable.targets[0]
+    target.id_type, target.id = "KEY", keys
+    target.data_path = f'key_blocks["{bpy.utils.escape_identifier(name)}"].value'

@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Animation of shape key values in one slotted action (Blender 4.4 and later): a slot for each animated datablock."""
+
+import bpy
+import numpy as np
+
+_LINEAR = 1  # Keyframe.interpolation, as foreach_set wants it
+OURS = "headshop"
+
+
+def new_action(name: str) -> bpy.types.Action:
+    """An empty layered action, marked as ours."""
+    action = bpy.data.actions.new(name)
+    action[OURS] = True
+    action.layers.new("Layer").strips.new(type="KEYFRAME")
+    return action
+
+
+def animate_keys(action: bpy.types.Action, keys: bpy.types.Key, frames, weights: dict[str, np.ndarray]) -> None:
+    """Give ``keys`` a slot of ``action``: shape key name -> values (f,) stand at ``frames`` (f,), linear between.
+
+    Where an artist animates the same datablock, his action stays and ours plays beside it as an NLA strip.
+    """
+    slot = action.slots.new(id_type="KEY", name=keys.name)
+    bag = action.layers[0].strips[0].channelbag(slot, ensure=True)
+    for name, values in weights.items():
+        curve = bag.fcurves.new(f'key_blocks["{bpy.utils.escape_identifier(name)}"].value')
+        curve.keyframe_points.add(len(frames))
+        points = np.stack([frames, values], axis=1).astype(np.float32)
+        curve.keyframe_points.foreach_set("co", points.ravel())
+        curve.keyframe_points.foreach_set("interpolation", np.full(len(frames), _LINEAR, dtype=np.int32))
+        curve.update()
+    data = keys.animation_data or keys.animation_data_create()
+    if data.action is None:
+        data.action, data.action_slot = action, slot
+    else:
+        strip = data.nla_tracks.new().strips.new(action.name, int(frames[0]), action)
+        strip.action_slot = slot
+
+
+def stop_keys(keys: bpy.types.Key) -> None:
+    """Take our actions off a datablock; an action nobody uses any more is deleted."""
+    data = keys.animation_data
+    if data is None:
+        return
+    actions = {data.action} if data.action is not None and data.action.get(OURS) else set()
+    if actions:
+        data.action = None
+    for track in list(data.nla_tracks):
+        mine = {strip.action for strip in track.strips if strip.action is not None and strip.action.get(OURS)}
+        if mine:
+            actions |= mine
+            data.nla_tracks.remove(track)
+    for action in actions:
+        if action.users == 0:
+            bpy.data.actions.remove(action)
+
+
+def curves_of(owner: bpy.types.ID) -> dict[str, bpy.types.FCurve]:
+    """Data path -> F-curve of an ID's action, in its slot; muted curves are left out."""
+    data = owner.animation_data
+    if data is None or data.action is None or data.action_slot is None:
+        return {}
+    bags = [strip.channelbag(data.action_slot) for layer in data.action.layers for strip in layer.strips]
+    return {curve.data_path: curve for bag in bags if bag is not None for curve in bag.fcurves if not curve.mute}
