@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A pose as an artist says it (muscles, jaw, lids, gaze) and what it asks of a model."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..errors import InputError
+from ..tissue.structures import Control, Model
+
+#: The controls that are not muscles.
+CONTROLS = ("jaw_open", "jaw_forward", "jaw_side", "blink_l", "blink_r", "gaze_x", "gaze_z")
+
+#: What gaze 1.0 means, rad (Ekman, Friesen and Hager 2002, AU 61 to 64: eyes to the side 35, up or down 25 degrees).
+GAZE_REACH = np.radians([35.0, 25.0])
+
+#: Lid closure by a fully contracted muscle: share of the rest opening, (upper lid, lower lid).
+_LID_WORK = {
+    "levator_palpebrae": (-0.32, 0.0),
+    "orbicularis_oculi_palpebral": (0.22, 2.6),
+    "orbicularis_oculi_lacrimal": (0.03, 0.1),
+    "orbicularis_oculi_orbital": (0.08, 1.2),
+}
+#: Jaw motion by fully contracted muscles of both sides: (open, forward); one side alone also moves the jaw sideways,
+#: away from it. Closers pull against opening.
+_JAW_WORK = {
+    "digastricus": (0.45, 0.0),
+    "pterygoideus_lateralis": (0.15, 0.6),
+    "masseter": (-0.5, 0.05),
+    "temporalis": (-0.4, -0.05),
+    "pterygoideus_medialis": (-0.3, 0.1),
+}
+_SIDE_WORK = 0.6
+
+
+@dataclass(frozen=True)
+class Pose:
+    """muscles: name -> 0..1; jaw_open 0..1, jaw_forward and jaw_side -1..1; blink 0..1; gaze -1..1 (left, up)."""
+
+    muscles: dict[str, float] = field(default_factory=dict)
+    jaw_open: float = 0.0
+    jaw_forward: float = 0.0
+    jaw_side: float = 0.0
+    blink_l: float = 0.0
+    blink_r: float = 0.0
+    gaze_x: float = 0.0
+    gaze_z: float = 0.0
+
+    def values(self) -> dict[str, float]:
+        """Channel name -> value: every muscle named, and all of `CONTROLS`."""
+        return {**self.muscles, **{name: getattr(self, name) for name in CONTROLS}}
+
+
+def pose_from(values: dict[str, float]) -> Pose:
+    """The pose with channels ``values`` (muscle and control names mixed)."""
+    muscles = {k: float(v) for k, v in values.items() if k not in CONTROLS}
+    return Pose(muscles, **{k: float(v) for k, v in values.items() if k in CONTROLS})
+
+
+def control(model: Model, pose: Pose) -> Control:
+    """The control of ``model`` for ``pose``. Values are clipped to their range.
+
+    Raises
+    ------
+    InputError : the pose names a muscle that the model does not have.
+    """
+    index = {name: k for k, name in enumerate(model.muscle_names)}
+    activation = np.zeros(len(index))
+    for name, value in pose.muscles.items():
+        if name not in index:
+            raise InputError(
+                f"The pose uses the muscle {name!r}, which this head does not have: correct the name or leave it out."
+            )
+        activation[index[name]] = np.clip(value, 0.0, 1.0)
+
+    def of(base, side):
+        return activation[index[f"{base}_{side}"]] if f"{base}_{side}" in index else 0.0
+
+    opening, forward, aside = float(pose.jaw_open), float(pose.jaw_forward), float(pose.jaw_side)
+    closing = 0.0
+    for base, (opens, ahead) in _JAW_WORK.items():
+        both = (of(base, "l") + of(base, "r")) / 2
+        if opens > 0:
+            opening += opens * both
+        else:
+            closing += opens * both
+        forward += ahead * both
+        if base == "pterygoideus_lateralis":
+            aside += _SIDE_WORK * (of(base, "r") - of(base, "l"))
+    opening = np.clip(opening + closing * max(opening, 0.0), 0.0, 1.0)  # closers can only undo an opening
+    lids = np.zeros((2, 2))
+    for k, (side, blink) in enumerate((("l", pose.blink_l), ("r", pose.blink_r))):
+        lids[k] = sum(of(base, side) * np.array(work) for base, work in _LID_WORK.items())
+        shut = float(np.clip(blink, 0, 1))
+        lids[k] = lids[k] * (1 - shut) + shut
+    return Control(
+        activations=activation,
+        jaw=np.array([opening, np.clip(forward, -1, 1), np.clip(aside, -1, 1)]),
+        lids=lids,
+        gaze=np.clip([pose.gaze_x, pose.gaze_z], -1, 1) * GAZE_REACH,
+    )

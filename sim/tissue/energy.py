@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""All forces of Lee, Terzopoulos and Waters 1995, 3.8 as the gradient of one energy of the free nodes.
+
+springs g (3.3) + volume q (3.6) + nodal restoration h, with the bending of the skin sheet + muscles f (3.4, 3.5) +
+lids + contact s (3.7). The restoration pulls to the *posed rest*: where the node would be if the tissue only followed
+the jaw. Everything but springs, volume, contact and spent muscles is quadratic, with one matrix for all poses.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+
+from . import contact
+from .jaw import jaw_transform
+from .lids import lid_targets
+from .springs import spring_energy
+from .structures import Control, Model
+from .volume import corner_gather, volume_energy
+
+
+@dataclass(frozen=True, eq=False)
+class Pose:
+    """What a control means for a model: everything that does not change while solving.
+
+    reference (3 n, 3): posed rest; rotation, translation of the mandible; pull (e, 3), push (e,), reach (e,), node (e,)
+    of the active muscle entries; lid_node (v,), lid_goal (v, 3), lid_stiffness (v,); gaze.
+    """
+
+    reference: np.ndarray
+    rotation: np.ndarray
+    translation: np.ndarray
+    node: np.ndarray
+    pull: np.ndarray
+    push: np.ndarray
+    reach: np.ndarray
+    lid_node: np.ndarray
+    lid_goal: np.ndarray
+    lid_stiffness: np.ndarray
+    gaze: np.ndarray
+
+
+def posed_reference(model: Model, rotation, translation) -> np.ndarray:
+    """(3 n, 3) mm: every node moved by its share with the mandible."""
+    layers = model.layers
+    moved = layers.nodes @ rotation.T + translation
+    share = np.concatenate([layers.jaw, layers.jaw, layers.mandible])[:, None]
+    return layers.nodes + share * (moved - layers.nodes)
+
+
+def pose_of(model: Model, control: Control) -> Pose:
+    """The constants of a solve for ``control``."""
+    rotation, translation = jaw_transform(model.jaw, *control.jaw)
+    reference = posed_reference(model, rotation, translation)
+    m = model.muscles
+    n = model.count
+    activation = np.clip(np.asarray(control.activations, float), 0, 1)
+    push = activation[m.owner] * m.strength[m.owner] * m.weight
+    on = np.flatnonzero(push > 0)
+    direction = m.direction[on]
+    turned = direction @ rotation.T
+    direction = direction + m.tie[on, None] * (turned - direction)
+    lid_node, lid_goal, lid_stiffness = [], [], []
+    for lids, closure in zip(model.lids, _lids_of(model, control), strict=True):
+        goal = lid_targets(lids, closure[0], closure[1], control.gaze)
+        # goals are offsets from the rest: the scan's own lids stay where they are
+        rest = model.layers.nodes[lids.column]
+        lid_node.append(lids.column)
+        lid_goal.append(rest + goal - lid_targets(lids, 0.0, 0.0, np.zeros(2)))
+        lid_stiffness.append(lids.weight**2)
+    none = np.zeros((0, 3))
+    return Pose(
+        reference=reference,
+        rotation=rotation,
+        translation=translation,
+        node=m.column[on] + n,
+        pull=direction,
+        push=push[on],
+        reach=m.reach[m.owner[on]],
+        lid_node=np.concatenate(lid_node) if lid_node else np.zeros(0, int),
+        lid_goal=np.concatenate(lid_goal) if lid_goal else none,
+        lid_stiffness=model.parameters.lid * np.concatenate(lid_stiffness) if lid_stiffness else np.zeros(0),
+        gaze=np.asarray(control.gaze, float),
+    )
+
+
+def _lids_of(model: Model, control: Control):
+    closure = np.asarray(control.lids, float).reshape(2, 2)
+    return [closure["lr".index(lids.side)] for lids in model.lids]
+
+
+def bending_stiffness(model: Model) -> float:
+    """Bending of the sheet (epidermis and fascia) from its stretching and `Parameters.bending_length`."""
+    p = model.parameters
+    return (p.epidermis + p.fascia) * p.bending_length**2
+
+
+def system_matrix(model: Model) -> dict:
+    """The constant parts: quadratic matrix Q (2 n), solver matrix A over the free nodes, helpers."""
+    layers, springs, p = model.layers, model.springs, model.parameters
+    n = model.count
+    laplacian = model.bending
+    bend = bending_stiffness(model) * (laplacian.T @ sparse.diags(1 / layers.area) @ laplacian)
+    hold = np.concatenate([0.15 * layers.restoration, 0.85 * layers.restoration])
+    quadratic = sparse.block_diag([0.7 * bend, 0.3 * bend], format="csr") + sparse.diags(hold)
+    lid = np.zeros(2 * n)
+    for lids in model.lids:
+        lid[lids.column] += p.lid * lids.weight**2
+    stretch = springs.gather @ sparse.diags(springs.stiffness) @ springs.difference
+    full = quadratic + stretch[: 2 * n, : 2 * n] + sparse.diags(lid)
+    free = np.flatnonzero(layers.free)
+    return {
+        "quadratic": quadratic[free].tocsr(),
+        "system": full[free][:, free].tocsc(),
+        "free": free,
+        "gather": corner_gather(model.prisms, 3 * n),
+        "margin": contact.bone_margin(layers),
+    }
+
+
+def energy_gradient(model: Model, pose: Pose, planes: contact.Planes, positions) -> tuple[float, np.ndarray]:
+    """Energy and its gradient over the free nodes (m, 3); ``positions`` (3 n, 3)."""
+    fixed = model.cache["matrix"]
+    n = model.count
+    free = fixed["free"]
+    energy, gradient = spring_energy(model.springs, positions)
+    if len(model.prisms):
+        e, g = volume_energy(positions, model.prisms, model.prism_volume, model.parameters.volume, fixed["gather"])
+        energy += e
+        gradient += g
+    e, g = contact.contact_energy(planes, positions, model.parameters.contact * model.parameters.epidermis)
+    energy += e
+    gradient += g
+    # muscles: force push (1 - progress / reach), spent at reach; contraction is progress along the fibre's direction
+    if len(pose.node):
+        progress = np.einsum("ij,ij->i", positions[pose.node] - pose.reference[pose.node], pose.pull)
+        left = np.maximum(1 - progress / pose.reach, 0)
+        energy -= 0.5 * float((pose.push * pose.reach) @ (1 - left**2))
+        force = (pose.push * left)[:, None] * pose.pull
+        for axis in range(3):
+            gradient[:, axis] -= np.bincount(pose.node, force[:, axis], minlength=len(gradient))
+    if len(pose.lid_node):
+        off = positions[pose.lid_node] - pose.lid_goal
+        pulled = pose.lid_stiffness[:, None] * off
+        energy += 0.5 * float(np.einsum("ij,ij->", pulled, off))
+        np.add.at(gradient, pose.lid_node, pulled)
+    moved = positions[: 2 * n] - pose.reference[: 2 * n]
+    restoring = fixed["quadratic"] @ moved
+    energy += 0.5 * float(np.einsum("ij,ij->", restoring, moved[free]))
+    return energy, gradient[free] + restoring
+
+
+def find_contacts(model: Model, pose: Pose, positions) -> contact.Planes:
+    """The planes that matter near ``positions`` (3 n, 3)."""
+    n = model.count
+    rest = model.layers.nodes[:n]
+    bone = pose.reference[2 * n :]
+    return contact.joined(
+        contact.bone_planes(model.layers, bone, pose.rotation, model.cache["matrix"]["margin"]),
+        *(contact.eye_planes(lids, positions[:n], pose.gaze) for lids in model.lids),
+        contact.teeth_contacts(model.contacts, positions[:n], rest, pose.rotation, pose.translation),
+        contact.lip_contacts(model.contacts, positions[:n], rest),
+    )

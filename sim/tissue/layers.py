@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Columns of tissue under every skin vertex: epidermis, fascia, bone (Lee, Terzopoulos and Waters 1995, 3.1, figure 6).
+
+A column stands on bone where bone lies close and in front of it along the inward direction. Lips, lids, cheeks over the
+mouth, nostrils, ears and neck have none: there the third node is a soft anchor inside the flesh that moves with the jaw
+by the head's own share, tied weakly, so that they move freely and still come back to the scan.
+"""
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..anatomy.head import Head
+from ..mesh import vertex_normals
+from .geometry import Surface, cotangent_stiffness, smoothed, vertex_areas
+from .parameters import Parameters
+from .structures import Layers
+
+#: Boneless places: depth in mm from skin to fascia, factor on the restoration, factor on the muscle-layer springs.
+_SOFT = {
+    "lid_upper": (0.9, 0.6, 0.3),
+    "lid_lower": (0.9, 0.6, 0.3),
+    "lip_upper": (2.2, 0.05, 0.05),
+    "lip_lower": (2.2, 0.05, 0.05),
+    "mouth_bag": (1.2, 0.10, 0.05),
+    "nostril": (1.2, 1.2, 0.6),
+    "ear": (1.5, 4.0, 1.0),
+    "neck": (4.0, 0.5, 0.5),
+}
+#: Cheeks and all else without bone within reach.
+_CHEEK = (3.5, 0.2, 0.15)
+_REACH = 24.0
+
+
+def _sides(groups, name):
+    names = [name] if name in groups else [name + "_l", name + "_r"]
+    found = [groups[n] for n in names if n in groups]
+    return np.clip(np.sum(found, axis=0), 0, 1) if found else 0.0
+
+
+def build_layers(head: Head, parameters: Parameters) -> Layers:
+    """The columns of ``head``; the rest position of every node."""
+    skin = head.skin
+    v, tri = skin.vertices, skin.triangles
+    n = len(v)
+    groups = {k: np.asarray(w, float) for k, w in head.groups.items()}
+    normal = vertex_normals(v, tri)
+    area = vertex_areas(v, tri)
+    stiffness = cotangent_stiffness(v, tri)
+    area = np.maximum(area, 1e-2)
+
+    surfaces = [Surface(head.parts[part].vertices, head.parts[part].triangles) for part in ("skull", "mandible")]
+    point, which, distance = zip(*(s.closest(v) for s in surfaces), strict=True)
+    nearer = (distance[1] < distance[0]).astype(int)
+    row = np.arange(n)
+    bone_point, bone_distance = np.stack(point)[nearer, row], np.stack(distance)[nearer, row]
+    bone_normal = np.stack([s.normal[w] for s, w in zip(surfaces, which, strict=True)])[nearer, row]
+    toward = (bone_point - v) / np.maximum(bone_distance, 1e-6)[:, None]
+    facing = -np.einsum("ij,ij->i", toward, normal)
+    # a bone triangle may be wound either way and thin plates have two sides: outward is toward this skin
+    flip = np.einsum("ij,ij->i", bone_normal, toward) > 0
+    bone_normal[flip] *= -1
+
+    soft = np.zeros(n)
+    depth = np.full(n, _CHEEK[0])
+    hold, layer = np.full(n, _CHEEK[1]), np.full(n, _CHEEK[2])
+    for name, (d, h, m) in _SOFT.items():
+        w = np.broadcast_to(_sides(groups, name), (n,))
+        soft = np.maximum(soft, w)
+        depth, hold, layer = (x + w * (y - x) for x, y in ((depth, d), (hold, h), (layer, m)))
+    inner = groups.get("inner", np.zeros(n))
+    depth = np.where(inner > 0.5, np.minimum(depth, 1.2), depth)
+    reach = (bone_distance < _REACH) & (bone_distance > 0.3) & (facing > 0.4) & (inner < 0.5)
+    firm = smoothed((reach & (soft < 0.5)).astype(float) * (1 - soft), stiffness, area, 4.0)
+    firm = np.clip(firm, 0, 1) * (inner < 0.5)
+    bony = reach & (firm > 0.5)
+
+    thick = np.clip(bone_distance, 1.0, _REACH)
+    bone_depth = np.minimum(0.55 * thick, 2.5 + 0.08 * thick)
+    offset = np.where(bony[:, None], toward * bone_depth[:, None], -normal * depth[:, None])
+    offset = smoothed(offset, stiffness, area, 2.0)
+    fascia = v + offset
+    bone = np.where(bony[:, None], bone_point, v + 2 * offset)
+
+    over_bone = np.clip(parameters.restoration_thickness / thick, 0.35, 1.5)
+    factor = firm * over_bone + (1 - firm) * hold
+    soften = np.where(bony, firm, layer)
+    face = groups.get("face", np.ones(n))
+    restoration = parameters.restoration_area * area * smoothed(factor, stiffness, area, 3.0)
+    restoration = restoration * (1 + 12 * np.clip(1 - face, 0, 1) ** 2)
+    jaw = groups.get("jaw", np.zeros(n))
+    mandible = np.where(bony, nearer.astype(float), jaw)
+    movable = face > 0.02
+    return Layers(
+        nodes=np.concatenate([v, fascia, bone]),
+        area=area,
+        bony=bony,
+        mandible=mandible,
+        jaw=jaw,
+        bone_normal=bone_normal,
+        restoration=restoration,
+        soften=soften,
+        free=np.concatenate([movable, movable]),
+    )
+
+
+def sheet_ties(head: Head, layers: Layers, reach: float = 9.0) -> np.ndarray:
+    """(p, 2) pairs of columns, inner skin (mouth bag, lid backs, nostrils) and the outer skin back to back with it."""
+    n = len(layers.area)
+    inner = np.asarray(head.groups.get("inner", np.zeros(n))) > 0.5
+    outer = np.flatnonzero(~inner & layers.free[:n])
+    inside = np.flatnonzero(inner & layers.free[:n])
+    if not len(outer) or not len(inside):
+        return np.zeros((0, 2), int)
+    fascia = layers.nodes[n : 2 * n]
+    normal = vertex_normals(head.skin.vertices, head.skin.triangles)
+    distance, near = cKDTree(fascia[outer]).query(fascia[inside], min(4, len(outer)))
+    distance, near = distance.reshape(len(inside), -1), near.reshape(len(inside), -1)
+    a = np.repeat(inside, near.shape[1])
+    b = outer[near.ravel()]
+    opposed = np.einsum("ij,ij->i", normal[a], normal[b]) < -0.2
+    keep = opposed & (distance.ravel() < reach) & (distance.ravel() > 0.2)
+    return np.stack([a[keep], b[keep]], axis=1)

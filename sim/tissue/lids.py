@@ -1,0 +1,173 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Lids slide over the eyeball: every lid vertex keeps its place along the lid and its height over the eye and turns
+about the axis from the inner to the outer corner. At closure 1 both margins meet on one line, most of the way down.
+"""
+
+import numpy as np
+
+from ..anatomy.head import Eye, Head
+from .layers import Layers
+from .structures import Lids
+
+#: Share of the opening that the lower lid covers in a blink (the upper lid does the rest).
+LOWER_SHARE = 0.12
+_BINS = 41
+
+
+def eye_profile(vertices: np.ndarray, eye: Eye) -> tuple[np.ndarray, np.ndarray]:
+    """Angle from the gaze (b,) rad and eyeball radius (b,) mm there: the cornea stands out of the sphere."""
+    rel = vertices - eye.centre
+    radius = np.linalg.norm(rel, axis=1)
+    angle = np.arccos(np.clip(rel @ eye.gaze / np.maximum(radius, 1e-9), -1, 1))
+    grid = np.linspace(0, np.pi, 64)
+    out = np.full(len(grid), eye.radius)
+    step = grid[1]
+    for k, g in enumerate(grid):
+        near = np.abs(angle - g) < 1.2 * step
+        if near.any():
+            out[k] = max(eye.radius, radius[near].max())
+    return grid, np.minimum(out, 1.25 * eye.radius)
+
+
+def _curve(along, value, low, high, pick):
+    """The margin as a smooth function of the place along the lid: the extreme of each stretch, then a smooth fit."""
+    centres = np.linspace(low, high, 13)
+    width = (high - low) / 9
+    found = []
+    for c in centres:
+        near = np.abs(along - c) < width / 2
+        if near.any():
+            found.append((c, pick(value[near])))
+    if len(found) < 4:
+        return None
+    x, y = np.array(found).T
+    return np.polynomial.Polynomial.fit(x, y, min(4, len(found) - 1))
+
+
+def build_lids(head: Head, layers: Layers, side: str) -> Lids | None:
+    """The lids of one eye (``"l"`` or ``"r"``), or None where the head has no lid skin there."""
+    eye = head.eyes[0 if side == "l" else 1]
+    v = head.skin.vertices
+    upper_group = np.asarray(head.groups.get(f"lid_upper_{side}", np.zeros(len(v))), float)
+    lower_group = np.asarray(head.groups.get(f"lid_lower_{side}", np.zeros(len(v))), float)
+    share = np.maximum(upper_group, lower_group)
+    column = np.flatnonzero((share > 0.01) & layers.free[: len(v)])
+    marks = head.landmark_positions()
+    if len(column) < 8 or f"en_{side}" not in marks:
+        return None
+    en, ex = marks[f"en_{side}"], marks[f"ex_{side}"]
+    axis = (ex - en) / np.linalg.norm(ex - en)
+    forward = eye.gaze - (eye.gaze @ axis) * axis
+    forward /= np.linalg.norm(forward)
+    up = np.cross(forward, axis)
+    if up[2] < 0:
+        up = -up
+
+    def place(p):
+        rel = p - eye.centre
+        f, u = rel @ forward, rel @ up
+        return rel @ axis, np.arctan2(u, f), np.hypot(u, f)
+
+    along, elevation, radius = place(v[column])
+    upper = upper_group[column] >= lower_group[column]
+    inner = np.asarray(head.groups.get("inner", np.zeros(len(v))), float)[column] > 0.5
+    (a0, e0, _), (a1, e1, _) = place(en), place(ex)
+    strong = share[column] > 0.6
+    curves = []
+    for is_upper, pick, name in ((True, np.min, "ps"), (False, np.max, "pi")):
+        rows = strong & (upper == is_upper) & ~inner & (along > a0) & (along < a1)
+        curve = _curve(along[rows], elevation[rows], a0, a1, pick) if rows.any() else None
+        if curve is None:
+            middle = place(marks[f"{name}_{side}"]) if f"{name}_{side}" in marks else ((a0 + a1) / 2, (e0 + e1) / 2, 0)
+            x = np.array([a0, middle[0], a1])
+            curve = np.polynomial.Polynomial.fit(x, [e0, middle[1], e1], 2)
+        curves.append(curve)
+    within = np.clip(along, a0, a1)
+    fade = np.clip(np.minimum(along - a0, a1 - along) / (0.12 * (a1 - a0)) + 0.35, 0, 1)
+    top, low = curves[0](within), curves[1](within)
+    opening = np.clip(top - low, 0, 1.2) * fade
+    # weight: 1 at the margin, 0 where the lid's own group ends; the groups are taken as drawn, scaled to reach 1
+    weight = np.clip(share[column] / max(np.percentile(share[column], 90), 1e-3), 0, 1)
+    profile_angle, profile = eye_profile(head.parts[f"eye_{side}"].vertices, eye)
+    distance = np.linalg.norm(v - eye.centre, axis=1)
+    touching = np.flatnonzero((distance < 1.6 * eye.radius) & layers.free[: len(v)])
+    rel = v[touching] - eye.centre
+    angle = np.arccos(np.clip(rel @ eye.gaze / np.maximum(distance[touching], 1e-9), -1, 1))
+    clearance = np.minimum(distance[touching] - np.interp(angle, profile_angle, profile), 0.15)
+    return Lids(
+        side=side,
+        eye=eye,
+        column=column,
+        weight=weight,
+        axis=axis,
+        forward=forward,
+        up=up,
+        along=along,
+        elevation=elevation,
+        radius=radius,
+        upper=upper,
+        opening=opening,
+        contact_column=touching,
+        clearance=clearance,
+        profile_angle=profile_angle,
+        profile=profile,
+    )
+
+
+def gaze_direction(eye: Eye, gaze: np.ndarray) -> np.ndarray:
+    """(3,) unit vector: the rest gaze turned by ``gaze`` rad to the subject's left and up."""
+    return gaze_rotation(gaze) @ eye.gaze
+
+
+def gaze_rotation(gaze: np.ndarray) -> np.ndarray:
+    """(3, 3): first up about the left-right axis, then left about the vertical."""
+    left, rise = float(gaze[0]), float(gaze[1])
+    c, s = np.cos(left), np.sin(left)
+    yaw = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+    c, s = np.cos(-rise), np.sin(-rise)
+    pitch = np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
+    return yaw @ pitch
+
+
+def eyeball_radius(lids: Lids, points: np.ndarray, gaze: np.ndarray) -> np.ndarray:
+    """(k,) mm: how far the eyeball reaches from its centre toward ``points`` (k, 3)."""
+    rel = points - lids.eye.centre
+    size = np.maximum(np.linalg.norm(rel, axis=1), 1e-9)
+    angle = np.arccos(np.clip(rel @ gaze_direction(lids.eye, gaze) / size, -1, 1))
+    return np.interp(angle, lids.profile_angle, lids.profile)
+
+
+def lid_targets(lids: Lids, upper: float, lower: float, gaze: np.ndarray) -> np.ndarray:
+    """(v, 3) mm: where the lid vertices want to be. upper, lower: 0 rest, 1 closed, negative wider.
+
+    The upper lid follows a vertical gaze; the lower one follows a downward gaze by half.
+    """
+    follow = float(gaze[1])
+    turn_upper = -upper * (1 - LOWER_SHARE) * lids.opening + 0.55 * follow * np.minimum(lids.opening / 0.5, 1)
+    turn_lower = lower * LOWER_SHARE * lids.opening + (0.3 * min(follow, 0) + 0.1 * max(follow, 0)) * np.minimum(
+        lids.opening / 0.5, 1
+    )
+    # never past each other: the meeting line limits both
+    closed = turn_lower - turn_upper
+    over = np.where(closed > lids.opening, lids.opening / np.maximum(closed, 1e-9), 1.0)
+    angle = lids.elevation + lids.weight * np.where(lids.upper, turn_upper, turn_lower) * over
+    frame = lids.along[:, None] * lids.axis
+
+    def at(radius):
+        plane = np.cos(angle)[:, None] * lids.forward + np.sin(angle)[:, None] * lids.up
+        return lids.eye.centre + frame + radius[:, None] * plane
+
+    target = at(lids.radius)
+    rel = target - lids.eye.centre
+    size = np.linalg.norm(rel, axis=1)
+    rest = at_rest(lids) - lids.eye.centre
+    rest_size = np.linalg.norm(rest, axis=1)
+    gap = np.minimum(rest_size - eyeball_radius(lids, lids.eye.centre + rest, np.zeros(2)), 0.15)
+    need = eyeball_radius(lids, target, gaze) + gap
+    return lids.eye.centre + rel * (np.maximum(size, need) / np.maximum(size, 1e-9))[:, None]
+
+
+def at_rest(lids: Lids) -> np.ndarray:
+    """(v, 3) mm, the lid vertices as scanned."""
+    plane = np.cos(lids.elevation)[:, None] * lids.forward + np.sin(lids.elevation)[:, None] * lids.up
+    return lids.eye.centre + lids.along[:, None] * lids.axis + lids.radius[:, None] * plane

@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""`build_model`: from a head to a model that acts."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+
+from ..anatomy.head import JAW_PARTS, Head
+from . import calibration
+from .contact import build_surfaces
+from .energy import system_matrix
+from .geometry import cotangent_stiffness
+from .layers import build_layers, sheet_ties
+from .lids import build_lids
+from .muscle_field import build_muscle_field
+from .parameters import DEFAULT, Parameters
+from .springs import build_springs
+from .structures import Control, Layers, Model, MuscleField, Solution, Springs, State
+from .volume import prism_volumes
+
+__all__ = ["Control", "Layers", "Model", "MuscleField", "Solution", "Springs", "State", "build_model", "strengths"]
+
+STRENGTHS = Path(__file__).resolve().parents[2] / "assets" / "tables" / "strengths.json"
+
+
+def strengths(path=STRENGTHS) -> dict:
+    """Muscle base name -> {"excursion_mm", …}: what the skin is seen to move at full contraction."""
+    return json.loads(Path(path).read_text(encoding="utf-8"))["muscles"]
+
+
+def build_model(head: Head, parameters: Parameters = DEFAULT, table: dict | None = None) -> Model:
+    """Tissue, muscles, jaw and lids of ``head`` (Lee, Terzopoulos and Waters 1995, section 3), muscles calibrated.
+
+    table : as `strengths`; the shipped one by default.
+    """
+    layers = build_layers(head, parameters)
+    n = len(layers.area)
+    triangles = head.skin.triangles
+    prisms = np.concatenate([triangles, triangles + n], axis=1)
+    # a prism pressed flat by a sharp fold of the skin has no volume to keep
+    volume = prism_volumes(layers.nodes, prisms)
+    moving = layers.free[:n][triangles].any(axis=1)
+    edge = np.linalg.norm(layers.nodes[triangles[:, 0]] - layers.nodes[triangles[:, 1]], axis=1)
+    kept = moving & (volume > 0.08 * edge**2)
+    laplacian = cotangent_stiffness(layers.nodes[:n], triangles)
+    model = Model(
+        parameters=parameters,
+        layers=layers,
+        springs=build_springs(head.skin.faces, layers, parameters, sheet_ties(head, layers)),
+        prisms=prisms[kept],
+        prism_volume=volume[kept],
+        bending=laplacian,
+        muscles=build_muscle_field(head, layers, strengths() if table is None else table),
+        lids=tuple(x for x in (build_lids(head, layers, side) for side in "lr") if x is not None),
+        contacts=build_surfaces(head, layers),
+        jaw=head.jaw,
+        eyes=head.eyes,
+        faces=head.skin.faces,
+        triangles=triangles,
+        mass=np.tile(layers.area * parameters.mass_area / 2, 2),
+        rigid={
+            p: head.parts[p].vertices for p in (*JAW_PARTS, "eye_l", "eye_r", "skull", "teeth_upper") if p in head.parts
+        },
+    )
+    model.cache["matrix"] = system_matrix(model)
+    return calibration.calibrated(model)

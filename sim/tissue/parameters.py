@@ -1,0 +1,45 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The constants of the tissue, with their sources.
+
+Stiffness keeps the ratios of Lee, Terzopoulos and Waters 1995, 3.10 (epidermis 60, dermal-fatty 30 then 70, fascia 80,
+muscle layer 10). The paper gives them per spring of one fixed mesh; here springs along a layer keep the number (a
+mesh of equal springs has a stretching stiffness that does not depend on its fineness), and springs across layers
+scale with the area each stands for, so the same face behaves alike on any mesh. The unit of force is arbitrary:
+muscle strength is calibrated in millimetres of motion, only ratios matter at rest. ``mass`` and ``damping`` set the
+time scale of `step`.
+"""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """Tissue constants; lengths mm, stiffness in the units of 3.10, ``_area`` per mm² of skin."""
+
+    epidermis: float = 60.0
+    dermal_fatty: float = 30.0
+    dermal_fatty_stiff: float = 70.0
+    biphasic_strain: float = 0.3
+    fascia: float = 80.0
+    muscle_layer: float = 10.0
+    #: mm² of skin that one through-spring of the paper stands for (684 elements on a face patch; about 8 mm edges).
+    element_area: float = 28.0
+    #: k1 of 3.6, per mm³ of relative change.
+    volume: float = 12.0
+    #: nodal restoration h of 3.8, per mm² of skin, over bone under `restoration_thickness` mm of tissue.
+    restoration_area: float = 0.55
+    restoration_thickness: float = 8.0
+    #: bending of the skin sheet, from the ratio of bending to stretching: the length (mm) under which it evens out.
+    bending_length: float = 6.0
+    #: contact penalties, in multiples of the epidermal stiffness.
+    contact: float = 4.0
+    lid: float = 60.0
+    #: grams per mm² of skin: 5 mm of tissue at about 1 g/cm³.
+    mass_area: float = 0.005
+    #: per second; near critical for the slowest modes.
+    damping_rate: float = 30.0
+    #: converts the stiffness unit to g/s² in `step`: soft tissue settles in a few frames.
+    dynamic_scale: float = 60.0
+
+
+DEFAULT = Parameters()

@@ -1,0 +1,25 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Every part of a head in a pose."""
+
+import numpy as np
+
+from ..anatomy.head import JAW_PARTS
+from .jaw import jaw_transform
+from .lids import gaze_rotation
+from .structures import Control, Model, State
+
+
+def posed_parts(model: Model, state: State, control: Control) -> dict[str, np.ndarray]:
+    """Part -> (n, 3) mm: the skin as solved, mandible, lower teeth and tongue with the jaw, the eyes with the gaze."""
+    rotation, translation = jaw_transform(model.jaw, *control.jaw)
+    turn = gaze_rotation(control.gaze)
+    out = {"skin": state.skin.copy()}
+    for part, vertices in model.rigid.items():
+        if part in JAW_PARTS:
+            out[part] = vertices @ rotation.T + translation
+        elif part.startswith("eye_"):
+            centre = model.eyes[0 if part.endswith("_l") else 1].centre
+            out[part] = (vertices - centre) @ turn.T + centre
+        else:
+            out[part] = vertices.copy()
+    return out

@@ -1,0 +1,195 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Rest positions and motion of the tissue.
+
+`solve` minimises the energy: quasi-Newton steps (L-BFGS, Nocedal and Wright 2006, algorithm 7.4) on the prefactored
+matrix of the springs at rest (as in projective dynamics, Liu et al. 2017), with a guarded line search. `step` is one
+implicit Euler step of the equations of motion of Lee, Terzopoulos and Waters 1995, 3.8, as the minimum of the energy
+plus inertia: stable at any dt.
+"""
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse.linalg import splu
+
+from . import contact
+from .diagnostics import diagnose
+from .energy import energy_gradient, find_contacts, pose_of
+from .structures import Control, Model, Solution, State
+
+_MEMORY = 10
+_REFRESH = 6  # steps between searches for contacts
+
+
+def rest_state(model: Model) -> State:
+    """The scan itself, at rest."""
+    return State(model.layers.nodes.copy(), np.zeros_like(model.layers.nodes))
+
+
+def solve(
+    model: Model, control: Control, state: State | None = None, *, max_iterations: int = 60, tolerance: float = 0.01
+) -> Solution:
+    """The pose at rest.
+
+    state : where to start (a pose near by makes it fast); the rest by default.
+    tolerance : mm; the largest remaining quasi-Newton step at which the pose counts as settled.
+    """
+    pose = pose_of(model, control)
+    start = pose.reference.copy()
+    if state is not None:
+        before = state.positions
+        start[: 2 * model.count] = before[: 2 * model.count]
+        start = _carry_jaw(model, state, pose, start)
+    start[~np.concatenate([model.layers.free, np.zeros(model.count, bool)])] = pose.reference[
+        ~np.concatenate([model.layers.free, np.zeros(model.count, bool)])
+    ]
+    if state is None and len(pose.lid_node):
+        start[pose.lid_node] = pose.lid_goal
+    factor = _factor(model)
+    positions, energy, residual, iterations, planes = _minimise(
+        lambda x, planes: energy_gradient(model, pose, planes, x),
+        lambda x: find_contacts(model, pose, x),
+        factor,
+        model.cache["matrix"]["free"],
+        start,
+        max_iterations,
+        tolerance,
+    )
+    n = model.count
+    visible = _skin_planes(find_contacts(model, pose, positions), n)
+    positions = contact.project(visible, positions)
+    result = State(positions, np.zeros_like(positions))
+    report = diagnose(model, pose, positions, visible, energy, residual)
+    return Solution(result, residual <= tolerance, residual, iterations, report)
+
+
+def _carry_jaw(model, state, pose, start):
+    """Move a warm start along with the jaw: keep each node's offset from its posed rest."""
+    n = model.count
+    bones = state.positions[2 * n :]
+    if np.abs(bones - pose.reference[2 * n :]).max() < 1e-9:
+        return start
+    before = _reference_of(model, bones)
+    start[: 2 * n] += (pose.reference - before)[: 2 * n]
+    return start
+
+
+def _reference_of(model, bones):
+    """The posed rest that belongs to bone nodes ``bones`` (n, 3): the rigid motion of the mandible, fitted to them."""
+    layers = model.layers
+    n = model.count
+    rest = layers.nodes[2 * n :]
+    share = layers.mandible
+    rows = np.flatnonzero(share > 0.999)
+    if len(rows) < 3:
+        return layers.nodes
+    a, b = rest[rows], bones[rows]
+    ca, cb = a.mean(axis=0), b.mean(axis=0)
+    u, _, vt = np.linalg.svd((b - cb).T @ (a - ca))
+    rotation = u @ np.diag([1, 1, np.sign(np.linalg.det(u @ vt))]) @ vt
+    moved = layers.nodes @ rotation.T + (cb - rotation @ ca)
+    w = np.concatenate([layers.jaw, layers.jaw, layers.mandible])[:, None]
+    return layers.nodes + w * (moved - layers.nodes)
+
+
+def _skin_planes(planes, n):
+    keep = (planes.node < n) & (planes.partner < n)
+    return contact.Planes(planes.node[keep], planes.normal[keep], planes.level[keep], planes.partner[keep])
+
+
+def _factor(model: Model, dt: float | None = None):
+    """LU of the solver matrix, with inertia and damping for a time step; the last few are kept."""
+    kept = model.cache.setdefault("factors", {})
+    if dt not in kept:
+        matrix = model.cache["matrix"]["system"]
+        if dt is not None:
+            free = model.cache["matrix"]["free"]
+            p = model.parameters
+            matrix = p.dynamic_scale * matrix + sparse.diags(model.mass[free] * (1 / dt**2 + p.damping_rate / dt))
+        while len(kept) > 3:
+            kept.pop(next(iter(kept)))
+        kept[dt] = splu(
+            matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}, diag_pivot_thresh=0.0
+        )
+    return kept[dt]
+
+
+def _minimise(value, contacts, factor, free, positions, max_iterations, tolerance):
+    """Quasi-Newton descent; returns positions, energy, residual (mm), iterations and the last contact planes."""
+    planes = contacts(positions)
+    energy, gradient = value(positions, planes)
+    pairs = []
+    residual, iterations = np.inf, 0
+    for iterations in range(1, max_iterations + 1):
+        if iterations > 1 and (iterations - 1) % _REFRESH == 0:
+            planes = contacts(positions)
+            energy, gradient = value(positions, planes)
+        direction = -_two_loop(gradient, pairs, factor)
+        slope = float(np.einsum("ij,ij->", direction, gradient))
+        if slope >= 0:  # a stale memory: fall back to the matrix alone
+            pairs.clear()
+            direction = -factor.solve(gradient)
+            slope = float(np.einsum("ij,ij->", direction, gradient))
+        residual = float(np.sqrt((direction**2).sum(axis=1).max(initial=0.0)))
+        if residual <= tolerance:
+            break
+        length = min(1.0, 15.0 / residual)  # no node jumps farther than this in one step
+        moved = positions.copy()
+        for _ in range(12):
+            moved[free] = positions[free] + length * direction
+            new_energy, new_gradient = value(moved, planes)
+            if new_energy <= energy + 1e-4 * length * slope:
+                break
+            length *= 0.5
+        else:
+            if not pairs:
+                break
+            pairs.clear()
+            continue
+        s, y = length * direction, new_gradient - gradient
+        curvature = float(np.einsum("ij,ij->", s, y))
+        if curvature > 1e-10:
+            pairs.append((s, y, curvature))
+            del pairs[:-_MEMORY]
+        positions, energy, gradient = moved, new_energy, new_gradient
+    return positions, energy, residual, iterations, planes
+
+
+def _two_loop(gradient, pairs, factor):
+    q = gradient.copy()
+    kept = []
+    for s, y, curvature in reversed(pairs):
+        a = float(np.einsum("ij,ij->", s, q)) / curvature
+        q -= a * y
+        kept.append(a)
+    r = factor.solve(q)
+    for (s, y, curvature), a in zip(pairs, reversed(kept), strict=True):
+        r += (a - float(np.einsum("ij,ij->", y, r)) / curvature) * s
+    return r
+
+
+def step(model: Model, state: State, control: Control, dt: float, *, max_iterations: int = 12) -> State:
+    """The state ``dt`` seconds later: m a + gamma v + forces = muscles (3.8), implicit Euler."""
+    pose = pose_of(model, control)
+    free = model.cache["matrix"]["free"]
+    p = model.parameters
+    mass = model.mass[free][:, None]
+    scale = p.dynamic_scale
+    ahead = state.positions[free] + dt * state.velocities[free]
+    here = state.positions[free]
+    start = pose.reference.copy()
+    start[free] = here
+
+    def value(x, planes):
+        energy, gradient = energy_gradient(model, pose, planes, x)
+        flight, drag = x[free] - ahead, x[free] - here
+        inertia = mass * flight / dt**2
+        friction = mass * p.damping_rate * drag / dt
+        energy = scale * energy + 0.5 * float((inertia * flight).sum() + (friction * drag).sum())
+        return energy, scale * gradient + inertia + friction
+
+    positions, *_ = _minimise(
+        value, lambda x: find_contacts(model, pose, x), _factor(model, dt), free, start, max_iterations, 1e-3
+    )
+    velocities = np.zeros_like(positions)
+    velocities[free] = (positions[free] - here) / dt
+    return State(positions, velocities)

@@ -1,0 +1,173 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Model, State, Control, Solution: what is built once, what changes, what is asked for and what came out."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ..anatomy.head import Eye, Jaw
+from .parameters import Parameters
+
+
+@dataclass(frozen=True, eq=False)
+class Layers:
+    """Where the prisms stand (Lee, Terzopoulos and Waters 1995, 3.1). All (n,) or (n, 3), one column per skin vertex.
+
+    nodes : (3 n, 3) mm at rest: epidermis, then fascia, then the bone node (or soft anchor) of each column
+    area : mm² of skin each column stands for
+    bony : bool, the column stands on bone
+    mandible : share 0..1 by which the bone node moves with the mandible
+    jaw : share by which skin and fascia would move with the mandible if they were free of all else
+    bone_normal : (n, 3) outward normal of the bone under the column
+    restoration : stiffness of the nodal restoration force of 3.8
+    soften : factor 0..1 on the muscle-layer springs (boneless places)
+    free : (2 n,) bool, epidermis and fascia nodes that the solver moves
+    """
+
+    nodes: np.ndarray
+    area: np.ndarray
+    bony: np.ndarray
+    mandible: np.ndarray
+    jaw: np.ndarray
+    bone_normal: np.ndarray
+    restoration: np.ndarray
+    soften: np.ndarray
+    free: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Springs:
+    """The springs of 3.3. kind is an index into `springs.KINDS`; ``stiff`` and ``limit``: second phase (biphasic)."""
+
+    first: np.ndarray
+    second: np.ndarray
+    kind: np.ndarray
+    rest: np.ndarray
+    stiffness: np.ndarray
+    stiff: np.ndarray
+    limit: np.ndarray
+    difference: Any  # sparse (s, 3 n): node positions -> spring vectors
+    gather: Any  # its transpose in row form
+
+
+@dataclass(frozen=True, eq=False)
+class MuscleField:
+    """Where each muscle pulls (3.4, 3.5). Entry e: muscle ``owner[e]`` pulls fascia column ``column[e]``.
+
+    weight : Theta_1 * Theta_2 times the column's area (a force per mm² of skin)
+    direction : (e, 3) unit vectors at rest
+    tie : share by which the direction turns with the mandible (muscles that arise from it)
+    strength, reach : (k,) force per mm² at activation 1 and the shortening in mm at which the muscle is spent
+    excursion : (k,) mm of skin motion expected at activation 1
+    """
+
+    names: tuple[str, ...]
+    owner: np.ndarray
+    column: np.ndarray
+    weight: np.ndarray
+    direction: np.ndarray
+    tie: np.ndarray
+    strength: np.ndarray
+    reach: np.ndarray
+    excursion: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Lids:
+    """One eye's lids as angles over the eyeball; see `lids`.
+
+    column : (v,) skin vertices that ride on the lids; weight (v,) 1 at the margin, 0 where the lid ends
+    axis, forward, up : the eye's frame; along, elevation, radius (v,) the cylindrical coordinates of each vertex
+    upper : (v,) bool; opening (v,) rad between the margins at the vertex's place
+    profile : (b,) eyeball radius over the angle from the gaze, `profile_angle` (b,)
+    """
+
+    side: str
+    eye: Eye
+    column: np.ndarray
+    weight: np.ndarray
+    axis: np.ndarray
+    forward: np.ndarray
+    up: np.ndarray
+    along: np.ndarray
+    elevation: np.ndarray
+    radius: np.ndarray
+    upper: np.ndarray
+    opening: np.ndarray
+    contact_column: np.ndarray
+    clearance: np.ndarray
+    profile_angle: np.ndarray
+    profile: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """A head ready to act: built once by `build_model`, never changed (``cache`` keeps factorisations)."""
+
+    parameters: Parameters
+    layers: Layers
+    springs: Springs
+    prisms: np.ndarray  # (t, 6) nodes: three of the epidermis, three of the fascia
+    prism_volume: np.ndarray  # (t,) mm³ at rest
+    bending: Any  # sparse (n, n): Laplacian of a field on the skin, mm^-1 after area weighting
+    muscles: MuscleField
+    lids: tuple[Lids, ...]
+    contacts: Any  # contact.Surfaces
+    jaw: Jaw
+    eyes: tuple[Eye, Eye]
+    faces: np.ndarray
+    triangles: np.ndarray
+    mass: np.ndarray  # (2 n,) g
+    rigid: dict[str, np.ndarray]  # vertices at rest of the parts that move rigidly
+    cache: dict = field(default_factory=dict, repr=False)
+
+    @property
+    def count(self) -> int:
+        """Number of skin vertices."""
+        return len(self.layers.area)
+
+    @property
+    def muscle_names(self) -> tuple[str, ...]:
+        """Names in the order of `Control.activations`."""
+        return self.muscles.names
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """positions (3 n, 3) mm and velocities (3 n, 3) mm/s of all nodes."""
+
+    positions: np.ndarray
+    velocities: np.ndarray
+
+    @property
+    def skin(self) -> np.ndarray:
+        """(n, 3) mm, the epidermis."""
+        return self.positions[: len(self.positions) // 3]
+
+
+@dataclass(frozen=True, eq=False)
+class Control:
+    """What is asked of the face.
+
+    activations : (k,) 0..1 in the order of `Model.muscle_names`
+    jaw : (3,) open 0..1, forward 0..1 (negative: back), side -1..1 (positive: to the subject's left)
+    lids : (2, 2) left and right eye; upper and lower: 0 at rest, 1 closed, negative: opened wider
+    gaze : (2,) rad, to the subject's left and up
+    """
+
+    activations: np.ndarray
+    jaw: np.ndarray
+    lids: np.ndarray
+    gaze: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """What `solve` found; ``residual`` is the largest remaining step in mm, diagnostics a dict of plain numbers."""
+
+    state: State
+    converged: bool
+    residual: float
+    iterations: int
+    diagnostics: dict

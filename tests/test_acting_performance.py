@@ -1,0 +1,74 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+import json
+
+import numpy as np
+import pytest
+from headshop.sim.acting.performance import (
+    FORMAT,
+    Performance,
+    performance_from,
+    read_performance,
+    sample_performance,
+    write_performance,
+)
+from headshop.sim.errors import InputError
+
+
+def test_easing_hits_keys_and_never_overshoots():
+    keys = ((0.0, 0.0), (0.5, 0.2), (1.0, 1.0), (1.5, 1.0), (2.0, 0.0))
+    performance = Performance({"jaw_open": keys}, 50.0)
+    for t, v in keys:
+        assert performance.value("jaw_open", t) == pytest.approx(v)
+    curve = np.array([performance.value("jaw_open", t) for t in np.linspace(0, 2, 201)])
+    assert curve.min() >= 0 and curve.max() <= 1
+    assert np.abs(np.diff(curve)).max() < 0.04  # no jumps
+    assert performance.value("jaw_open", 1.25) == pytest.approx(1.0)
+    assert performance.frame_count == 101
+
+
+def test_file_round_trip(tmp_path):
+    path = tmp_path / "smile.json"
+    write_performance(path, sample_performance())
+    again = read_performance(path)
+    assert again == sample_performance()
+    assert json.loads(path.read_text())["format"] == FORMAT
+
+
+def test_sample_smile_begins_and_ends_at_rest_and_blinks():
+    smile = sample_performance("smile")
+    assert 2.0 <= smile.duration <= 3.0 and smile.fps == 24
+    for time in (0.0, smile.duration):
+        assert all(v == 0 for v in smile.pose(time).values().values())
+    poses = smile.frames()
+    assert max(p.blink_l for p in poses) > 0.9
+    left = np.array([p.muscles["zygomaticus_major_l"] for p in poses])
+    right = np.array([p.muscles["zygomaticus_major_r"] for p in poses])
+    assert left.max() > right.max() > 0.5 and np.argmax(left > 0.1) <= np.argmax(right > 0.1)
+
+
+@pytest.mark.parametrize(
+    "document, word",
+    [
+        ([], "format"),
+        ({"format": "other"}, "format"),
+        ({"format": FORMAT, "fps": 0, "channels": {"a": [[0, 0]]}}, "fps"),
+        ({"format": FORMAT}, "channels"),
+        ({"format": FORMAT, "channels": {"a": [[0, "x"]]}}, "pairs"),
+        ({"format": FORMAT, "channels": {"a": [[1, 0], [0, 0]]}}, "rise"),
+        ({"format": FORMAT, "channels": {"a": [[-1, 0], [0, 0]]}}, "between"),
+        ({"format": FORMAT, "channels": {"a": [[0, float("nan")]]}}, "pairs"),
+    ],
+)
+def test_bad_documents_say_what_to_do(document, word):
+    with pytest.raises(InputError, match=word):
+        performance_from(document)
+
+
+def test_bad_files(tmp_path):
+    with pytest.raises(InputError, match="no performance file"):
+        read_performance(tmp_path / "missing.json")
+    (tmp_path / "bad.json").write_text("{")
+    with pytest.raises(InputError, match="not a JSON"):
+        read_performance(tmp_path / "bad.json")
+    with pytest.raises(InputError, match="sample"):
+        sample_performance("sneeze")
