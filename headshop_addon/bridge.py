@@ -133,6 +133,7 @@ def ensure_shape_key(obj: bpy.types.Object, name: str) -> bpy.types.ShapeKey:
     if obj.data.shape_keys is None:
         obj.shape_key_add(name="Basis", from_mix=False)
         obj.data.shape_keys.use_relative = True
+        obj.data.shape_keys.name = obj.name  # what its slot in an action is called
     blocks = obj.data.shape_keys.key_blocks
     if name in blocks:
         return blocks[name]

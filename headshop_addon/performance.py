@@ -99,7 +99,7 @@ def write_performance(skin, found: dict, frames: np.ndarray, name: str) -> None:
         basis, turn = bridge.read_positions(obj), np.linalg.inv(heads.placement(skin, obj)[:3, :3]).T
         weights = {}
         for number, shape in enumerate(found[part].shapes):
-            block = bridge.ensure_shape_key(obj, _free_name(obj, f"{name} {number + 1:02d}"))
+            block = bridge.ensure_shape_key(obj, _free_name(obj, f"{name}_{number + 1:02d}"))
             block.slider_min, block.slider_max = -1.0, 1.0
             bridge.write_positions(obj, basis + shape @ turn, block.name)
             weights[block.name] = found[part].weights[:, number]

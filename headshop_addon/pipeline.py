@@ -100,6 +100,7 @@ def add_scan(scan: Scan, name: str, scene: bpy.types.Scene | None = None) -> bpy
     """Put a scan into the scene as an object at the origin, in metres."""
     obj = bridge.mesh_to_object(scan.mesh, name)
     obj[heads.PART] = "scan"
+    heads.write_report(obj, {"scan": scan.report})
     (scene or bpy.context.scene).collection.objects.link(obj)
     return obj
 

@@ -1,0 +1,152 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""An engine-ready copy of a head: plain meshes with shape keys of exact names, no modifiers, no drivers.
+
+The copies live in a scene of their own for the moment of the export; the artist's scene stays as it was.
+"""
+
+from contextlib import contextmanager
+from pathlib import Path
+
+import bpy
+
+from ..sim.errors import InputError
+from . import heads
+from .outputs import Outputs
+from .quiet import quiet
+
+#: What an engine gets: all that is seen. Bones and muscles stay behind.
+PARTS = ("skin", "eye_l", "eye_r", "teeth_upper", "teeth_lower", "tongue")
+#: The shape key that follows the sliders; the engine has no sliders.
+_LIVE = "Live"
+
+
+def _glb(path: str, animated: bool) -> None:
+    if not hasattr(bpy.types, "EXPORT_SCENE_OT_gltf"):
+        raise InputError("Blender's glTF add-on is off: switch it on in Preferences, Add-ons.")
+    bpy.ops.export_scene.gltf(
+        filepath=path,
+        export_format="GLB",
+        use_active_scene=True,
+        export_apply=False,
+        export_morph=True,
+        export_morph_normal=True,
+        export_animations=animated,
+        export_animation_mode="SCENE",
+        export_cameras=False,
+        export_lights=False,
+    )
+
+
+def _fbx(path: str, animated: bool) -> None:
+    bpy.ops.export_scene.fbx(
+        filepath=path,
+        object_types={"MESH"},
+        use_mesh_modifiers=False,
+        mesh_smooth_type="OFF",
+        bake_anim=animated,
+        bake_anim_use_all_actions=False,
+        bake_anim_use_nla_strips=False,
+        bake_anim_simplify_factor=0.0,
+    )
+
+
+def _usdc(path: str, animated: bool) -> None:
+    bpy.ops.wm.usd_export(
+        filepath=path,
+        export_animation=animated,
+        export_shapekeys=True,
+        export_armatures=False,
+        export_lights=False,
+        export_cameras=False,
+        convert_world_material=False,
+        export_custom_properties=False,
+    )
+
+
+_EXPORTERS = {".glb": _glb, ".fbx": _fbx, ".usdc": _usdc}
+EXTENSIONS = tuple(_EXPORTERS)
+
+
+def export_head(skin: bpy.types.Object, path) -> list[str]:
+    """Write the head's visible parts with all their shape keys; returns the names of the skin's.
+
+    The file appears whole or not at all. A baked performance goes along as animation of the shape keys.
+
+    Raises
+    ------
+    InputError : not a whole head, an unknown extension, or the file cannot be written there.
+    """
+    path = Path(path)
+    if path.suffix.lower() not in _EXPORTERS:
+        raise InputError(f"{path.name} must end in {', '.join(_EXPORTERS)}: rename it.")
+    heads.read_head(skin)
+    with Outputs() as outputs, _copies(skin) as copies:
+        keys = copies["skin"].data.shape_keys
+        animated = any(c.data.shape_keys and _action_of(c.data.shape_keys) for c in copies.values())
+        temporary = outputs.file(path)
+        with quiet() as printed:
+            try:
+                _EXPORTERS[path.suffix.lower()](str(temporary.resolve()), animated)
+            except RuntimeError as error:
+                raise RuntimeError(f"{error} {printed()}") from error
+        if not temporary.is_file():
+            raise RuntimeError(f"Blender wrote no {path.suffix} file")
+        return [block.name for block in keys.key_blocks[1:]] if keys else []
+
+
+def _action_of(keys):
+    return keys.animation_data.action if keys.animation_data is not None else None
+
+
+@contextmanager
+def _copies(skin: bpy.types.Object):
+    """Part -> a copy of its object, alone in a scene that is the context's; the copies bear the originals' names."""
+    original = bpy.context.scene
+    scene = bpy.data.scenes.new("Head Shop export")
+    scene.render.fps, scene.render.fps_base = original.render.fps, original.render.fps_base
+    scene.frame_start, scene.frame_end = original.frame_start, original.frame_end
+    scene.unit_settings.scale_length = original.unit_settings.scale_length
+    copies, lent = {}, []
+    try:
+        for part, obj in heads.parts_of(skin).items():
+            if part in PARTS:
+                copies[part] = _copy(obj, lent)
+                scene.collection.objects.link(copies[part])
+        for part, obj in copies.items():
+            obj.parent = None
+            obj.matrix_world = skin.matrix_world @ _matrix(heads.placement(skin, heads.parts_of(skin)[part]))
+        with bpy.context.temp_override(scene=scene, view_layer=scene.view_layers[0], collection=scene.collection):
+            scene.view_layers[0].update()
+            yield copies
+    finally:
+        for obj in copies.values():
+            bpy.data.meshes.remove(obj.data)  # takes the object along
+        bpy.data.scenes.remove(scene)
+        for block, name in reversed(lent):
+            block.name = name
+
+
+def _matrix(rows):
+    from mathutils import Matrix
+
+    return Matrix(rows.tolist())
+
+
+def _copy(obj, lent: list) -> bpy.types.Object:
+    """A copy without modifiers, drivers, custom properties or the live pose, under the original's own name."""
+    mesh = obj.data.copy()
+    for block in (obj, obj.data):
+        lent.append((block, block.name))
+    name, mesh_name = obj.name, obj.data.name
+    obj.name, obj.data.name = name + " (original)", mesh_name + " (original)"
+    mesh.name = mesh_name
+    copy = bpy.data.objects.new(name, mesh)
+    copy.name = name
+    keys = mesh.shape_keys
+    if keys is not None:
+        if keys.animation_data is not None:
+            for curve in list(keys.animation_data.drivers):
+                keys.animation_data.drivers.remove(curve)
+        if _LIVE in keys.key_blocks:
+            copy.shape_key_remove(keys.key_blocks[_LIVE])
+    return copy

@@ -1,0 +1,213 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Whatever a user gives: exit status 2, one sentence on stderr that says what is wrong, no file left behind."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+from headshop.headshop_addon.command_line import main
+from headshop.sim.anatomy.head import Head
+from headshop.sim.mesh import Mesh
+from headshop.sim.scan.ply import write_ply
+
+
+@pytest.fixture
+def scan(tmp_path, reference: Head):
+    """The reference head's own skin as a scan file in mm; its parent folder holds nothing else but landmarks."""
+    path = tmp_path / "in" / "scan.ply"
+    path.parent.mkdir()
+    write_ply(path, reference.skin)
+    return path
+
+
+@pytest.fixture
+def landmarks(tmp_path, scan, reference: Head):
+    """A landmark file; call with changes to make a bad one."""
+
+    def write(**change):
+        points = {name: point.tolist() for name, point in reference.landmark_positions().items()}
+        document = {"format": "headshop-landmarks/1", "units": "mm", "landmarks": points, "missing": []} | change
+        path = scan.with_name("landmarks.json")
+        path.write_text(json.dumps(document))
+        return path
+
+    return write
+
+
+def fails(capfd, tmp_path, *arguments, status=2) -> str:
+    """Run the program; check status, the single sentence and that no file appeared; returns the sentence."""
+    before = sorted(tmp_path.rglob("*"))
+    assert main([str(argument) for argument in arguments]) == status
+    printed = capfd.readouterr()
+    assert printed.out == ""
+    assert printed.err.count("\n") == 1 and printed.err.startswith("headshop"), printed.err
+    assert "Traceback" not in printed.err and len(printed.err) < 400
+    assert sorted(tmp_path.rglob("*")) == before
+    return printed.err
+
+
+def build(scan, landmarks, tmp_path):
+    return (
+        "build",
+        scan,
+        "--landmarks",
+        landmarks,
+        "-o",
+        tmp_path / "made" / "head.blend",
+        "--export",
+        tmp_path / "plain",
+    )
+
+
+@pytest.mark.parametrize(
+    ("arguments", "word"),
+    [
+        (["fly"], "fly"),
+        (["build"], "SCAN"),
+        (["build", "x.ply"], "--output"),
+        (["bake", "x.blend", "--set", "all"], "all"),
+        (["build", "x.ply", "-o", "x.blend", "--units", "miles"], "miles"),
+    ],
+)
+def test_a_wrong_command_is_one_sentence(capfd, tmp_path, arguments, word):
+    assert word in fails(capfd, tmp_path, *arguments)
+
+
+def test_no_scan_there(capfd, tmp_path, landmarks):
+    assert "nowhere.ply" in fails(capfd, tmp_path, *build(tmp_path / "nowhere.ply", landmarks(), tmp_path))
+
+
+def test_no_landmark_file_there(capfd, tmp_path, scan):
+    assert "nowhere.json" in fails(capfd, tmp_path, *build(scan, tmp_path / "nowhere.json", tmp_path))
+
+
+def test_landmarks_are_asked_for(capfd, tmp_path, scan):
+    assert "--landmarks" in fails(capfd, tmp_path, "build", scan, "-o", tmp_path / "head.blend")
+    assert "--landmarks" in fails(capfd, tmp_path, "landmarks", scan, "-o", tmp_path / "found.json")
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "word"),
+    [
+        ("scan.ply", b"", "empty"),
+        ("scan.ply", b"This is a letter, not a scan.\n", "PLY"),
+        ("scan.stl", b"This is a letter, not a scan.\n" * 9, "cut off"),
+        ("scan.obj", b"This is a letter, not a scan.\n", "OBJ"),
+        ("scan.glb", b"This is a letter, not a scan.\n", "GLB"),
+        ("scan.fbx", b"This is a letter, not a scan.\n", "FBX"),
+        ("scan.usdc", b"This is a letter, not a scan.\n", "USDC"),
+        ("scan.docx", b"This is a letter, not a scan.\n", "PLY, OBJ, STL, GLB"),
+    ],
+)
+def test_a_file_that_is_no_scan(bpy, capfd, tmp_path, scan, landmarks, name, content, word):
+    bad = scan.with_name(name)
+    bad.write_bytes(content)
+    assert word in fails(capfd, tmp_path, *build(bad, landmarks(), tmp_path))
+
+
+def test_a_truncated_scan(bpy, capfd, tmp_path, scan, landmarks):
+    scan.write_bytes(scan.read_bytes()[:-5000])
+    assert "truncated" in fails(capfd, tmp_path, *build(scan, landmarks(), tmp_path))
+
+
+def test_a_scan_of_one_triangle(bpy, capfd, tmp_path, scan, landmarks):
+    write_ply(scan, Mesh.from_triangles([[0, 0, 0], [100, 0, 0], [0, 0, 100]], [[0, 1, 2]]))
+    assert "1 triangle" in fails(capfd, tmp_path, *build(scan, landmarks(), tmp_path))
+
+
+def test_three_landmarks(bpy, capfd, tmp_path, scan, landmarks):
+    few = {"prn": [0, -100, 0], "t_l": [70, 0, 0], "t_r": [-70, 0, 0]}
+    assert "3 landmarks" in fails(capfd, tmp_path, *build(scan, landmarks(landmarks=few), tmp_path))
+
+
+def test_coplanar_landmarks(bpy, capfd, tmp_path, scan, landmarks, reference):
+    flat = {name: [x, -90.0, z] for name, (x, _, z) in reference.landmark_positions().items() if name in _FRONT}
+    assert "plane" in fails(capfd, tmp_path, *build(scan, landmarks(landmarks=flat), tmp_path))
+
+
+_FRONT = ("prn", "ex_l", "ex_r", "ch_l", "ch_r", "gn")
+
+
+def test_an_unknown_landmark(bpy, capfd, tmp_path, scan, landmarks, reference):
+    points = {name: point.tolist() for name, point in reference.landmark_positions().items()}
+    wrong = landmarks(landmarks=points | {"nose_tip": points["prn"]})
+    assert "nose_tip" in fails(capfd, tmp_path, *build(scan, wrong, tmp_path))
+
+
+def test_landmarks_in_metres(bpy, capfd, tmp_path, scan, landmarks, reference):
+    points = {name: (point / 1000).tolist() for name, point in reference.landmark_positions().items()}
+    assert "metres" in fails(capfd, tmp_path, *build(scan, landmarks(landmarks=points), tmp_path))
+
+
+@pytest.mark.parametrize("output", ["in/scan.ply/head.blend", "in", "head.txt"])
+def test_an_output_that_cannot_be_written(capfd, tmp_path, scan, landmarks, output):
+    given = landmarks()
+    assert output.split("/")[-1].split(".")[0] in fails(
+        capfd, tmp_path, "build", scan, "--landmarks", given, "-o", tmp_path / output
+    )
+
+
+@pytest.mark.parametrize("name", ["facs", "arkit"])
+def test_sets_to_come(capfd, tmp_path, name):
+    head = tmp_path / "head.blend"
+    head.write_bytes(b"anything")
+    assert f"set {name} is not in this version" in fails(capfd, tmp_path, "bake", head, "--set", name)
+
+
+def test_a_blend_that_is_none(bpy, capfd, tmp_path):
+    head = tmp_path / "head.blend"
+    head.write_bytes(b"This is a letter.")
+    assert "head.blend" in fails(capfd, tmp_path, "bake", head, "--set", "expressions")
+
+
+def test_a_blend_without_a_head(bpy, capfd, tmp_path):
+    head = tmp_path / "head.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(head), copy=True)
+    capfd.readouterr()
+    assert "no head" in fails(capfd, tmp_path, "bake", head, "--set", "expressions")
+
+
+def test_nothing_to_bake(capfd, tmp_path):
+    head = tmp_path / "head.blend"
+    head.write_bytes(b"anything")
+    assert "--set" in fails(capfd, tmp_path, "bake", head)
+
+
+def test_ctrl_c_in_the_middle(blender, tmp_path, scan, landmarks):
+    given = landmarks()
+    before = sorted(tmp_path.rglob("*"))
+    command = [sys.executable, "-m", "headshop", *map(str, build(scan, given, tmp_path))]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    while process.poll() is None and sorted(tmp_path.rglob("*")) == before:
+        time.sleep(0.02)  # until it has begun: its scratch folder is there
+    time.sleep(0.3)
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=60)
+    assert process.returncode == 130, (out, err)
+    assert err == "headshop: Interrupted: nothing was written.\n"
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_without_blender_there_is_a_sentence(tmp_path, scan, landmarks):
+    code = (
+        "import sys; sys.modules['bpy'] = None; from headshop.headshop_addon.command_line import main; sys.exit(main())"
+    )
+    command = [sys.executable, "-c", code, *map(str, build(scan, landmarks(), tmp_path))]
+    before = sorted(tmp_path.rglob("*"))
+    done = subprocess.run(command, capture_output=True, text=True, env=os.environ | {"PYTHONSAFEPATH": "1"})
+    assert done.returncode == 2 and "pip install bpy" in done.stderr and done.stderr.count("\n") == 1
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_a_scan_with_nan_is_cleaned_and_counted(bpy, capfd, tmp_path, scan, landmarks, reference):
+    vertices = reference.skin.vertices.copy()
+    vertices[:3] = np.nan
+    write_ply(scan, reference.skin.moved(vertices))
+    assert main([str(argument) for argument in build(scan, landmarks(), tmp_path)]) == 0
+    report = json.loads((tmp_path / "plain" / "report.json").read_text())
+    assert report["scan"]["nonfinite_vertices"] == 3
