@@ -34,6 +34,7 @@ def build_model(head: Head, parameters: Parameters = DEFAULT, table: dict | None
 
     table : as `strengths`; the shipped one by default.
     """
+    table = strengths() if table is None else table
     layers = build_layers(head, parameters)
     n = len(layers.area)
     triangles = head.skin.triangles
@@ -51,7 +52,7 @@ def build_model(head: Head, parameters: Parameters = DEFAULT, table: dict | None
         prisms=prisms[kept],
         prism_volume=volume[kept],
         bending=laplacian,
-        muscles=build_muscle_field(head, layers, strengths() if table is None else table),
+        muscles=build_muscle_field(head, layers, table),
         lids=tuple(x for x in (build_lids(head, layers, side) for side in "lr") if x is not None),
         contacts=build_surfaces(head, layers),
         jaw=head.jaw,
@@ -64,4 +65,4 @@ def build_model(head: Head, parameters: Parameters = DEFAULT, table: dict | None
         },
     )
     model.cache["matrix"] = system_matrix(model)
-    return calibration.calibrated(model)
+    return calibration.calibrated(model, table)

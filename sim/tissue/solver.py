@@ -44,7 +44,7 @@ def solve(
     ]
     if state is None and len(pose.lid_node):
         start[pose.lid_node] = pose.lid_goal
-    factor = _factor(model)
+    factor = factorised(model)
     positions, energy, residual, iterations, planes = _minimise(
         lambda x, planes: energy_gradient(model, pose, planes, x),
         lambda x: find_contacts(model, pose, x),
@@ -96,7 +96,7 @@ def _skin_planes(planes, n):
     return contact.Planes(planes.node[keep], planes.normal[keep], planes.level[keep], planes.partner[keep])
 
 
-def _factor(model: Model, dt: float | None = None):
+def factorised(model: Model, dt: float | None = None):
     """LU of the solver matrix, with inertia and damping for a time step; the last few are kept."""
     kept = model.cache.setdefault("factors", {})
     if dt not in kept:
@@ -188,7 +188,7 @@ def step(model: Model, state: State, control: Control, dt: float, *, max_iterati
         return energy, scale * gradient + inertia + friction
 
     positions, *_ = _minimise(
-        value, lambda x: find_contacts(model, pose, x), _factor(model, dt), free, start, max_iterations, 1e-3
+        value, lambda x: find_contacts(model, pose, x), factorised(model, dt), free, start, max_iterations, 1e-3
     )
     velocities = np.zeros_like(positions)
     velocities[free] = (positions[free] - here) / dt
