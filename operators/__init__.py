@@ -1,2 +1,32 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """One thin operator per file: parse, call one function, report."""
+
+from importlib import import_module
+
+from bpy.utils import register_class, unregister_class
+
+FILES = (
+    *("import_scan", "make_sample", "choose_scan"),
+    *("load_landmarks", "save_landmarks", "click_landmarks", "clear_landmarks"),
+    *("build_head", "dress_head", "repack_uv"),
+    *("reset_muscles", "set_expression", "key_sliders"),
+    *("bake_expressions", "bake_muscles", "bake_performance"),
+    *("export_head", "render_sheet"),
+)
+
+
+def classes() -> list[type]:
+    """The operator class of every file: ``HEADSHOP_OT_<file>``."""
+    return [getattr(import_module(f".{name}", __package__), f"HEADSHOP_OT_{name}") for name in FILES]
+
+
+def register():
+    """Register all operators."""
+    for cls in classes():
+        register_class(cls)
+
+
+def unregister():
+    """Unregister all operators, last first."""
+    for cls in reversed(classes()):
+        unregister_class(cls)

@@ -1,0 +1,23 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which scan and which head the sidebar and the operators work on."""
+
+import bpy
+
+from . import heads
+
+
+def scan(context) -> bpy.types.Object | None:
+    """The scan chosen in the sidebar, if it is in this scene."""
+    chosen = context.scene.headshop.scan
+    return chosen if chosen is not None and chosen.name in context.scene.objects else None
+
+
+def skin(context) -> bpy.types.Object | None:
+    """The skin of the head in question: the active object's, the one chosen in the sidebar, or the only one."""
+    found = heads.skin_of(getattr(context, "active_object", None))
+    if found is not None:
+        return found
+    chosen = context.scene.headshop.head
+    if heads.is_skin(chosen) and chosen.name in context.scene.objects:
+        return chosen
+    return next(iter(heads.find_heads(context.scene)), None)

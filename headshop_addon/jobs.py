@@ -1,0 +1,173 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Operators that take a while: a generator of `Progress` driven by a timer in the window, by a loop everywhere else.
+
+In the window the job shows its progress in the status bar and the sidebar, Esc cancels it, and everything else waits,
+so nothing can pull the scene from under it. Either way Blender makes one undo step when it is finished and none when
+it was cancelled: a job must leave nothing half-made when its generator is closed.
+"""
+
+import time
+import traceback
+from dataclasses import dataclass
+
+import bpy
+
+from ..sim.errors import InputError
+from ..sim.progress import Progress, Work
+from ..sim.progress import finish as run_to_the_end
+
+_SLICE = 0.08  # seconds of work between two redraws
+_NAVIGATION = {"MIDDLEMOUSE", "WHEELUPMOUSE", "WHEELDOWNMOUSE", "TRACKPADPAN", "TRACKPADZOOM", "NDOF_MOTION"}
+
+
+@dataclass
+class Running:
+    """The job in progress, for the sidebar."""
+
+    title: str
+    fraction: float = 0.0
+    label: str = ""
+
+
+#: The job in progress, if any; nothing but the sidebar's progress bar reads it.
+running: Running | None = None
+
+
+def sentence(error: Exception) -> str:
+    """What to tell the artist about an error of the input or of the file system."""
+    if isinstance(error, OSError):
+        return f"{error.filename or 'The file'}: {error.strerror or error}."
+    return str(error)
+
+
+class Simple:
+    """Mixin of short operators: write ``act(context)``; input errors become reports."""
+
+    def execute(self, context):
+        """Run ``act``; report what is wrong with the input."""
+        try:
+            message = self.act(context)
+        except (InputError, OSError) as error:
+            self.report({"ERROR"}, sentence(error))
+            return {"CANCELLED"}
+        if message:
+            self.report({"INFO"}, message)
+        return {"FINISHED"}
+
+
+class Job:
+    """Mixin of long operators: write ``work(context)``, a generator, and ``finish(context, result)``."""
+
+    _work: Work | None = None
+    _timer = None
+
+    def work(self, context) -> Work:
+        """The generator to run."""
+        raise NotImplementedError
+
+    def finish(self, context, result) -> str | None:
+        """Take the result into the scene; the returned sentence is reported."""
+
+    def execute(self, context):
+        """Run to the end at once, for scripts and Blender without a window."""
+        try:
+            message = self.finish(context, run_to_the_end(self.work(context)))
+        except (InputError, OSError) as error:
+            self.report({"ERROR"}, sentence(error))
+            return {"CANCELLED"}
+        if message:
+            self.report({"INFO"}, message)
+        return {"FINISHED"}
+
+    def invoke(self, context, event):
+        """Run under a timer."""
+        global running
+        if bpy.app.background or context.window is None:
+            return self.execute(context)
+        if running is not None:
+            self.report({"WARNING"}, f"{running.title} is still running: wait, or press Esc to cancel it.")
+            return {"CANCELLED"}
+        self._work = self.work(context)
+        running = Running(self.bl_label)
+        manager = context.window_manager
+        self._timer = manager.event_timer_add(0.01, window=context.window)
+        manager.modal_handler_add(self)
+        self._show(context, Progress(0.0, "Starting"))
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context, event):
+        """Do a slice of work at each tick of the timer."""
+        if event.type == "ESC" and event.value == "PRESS":
+            self._end(context)
+            self.report({"INFO"}, f"{self.bl_label}: cancelled, nothing was changed")
+            return {"CANCELLED"}
+        if event.type in _NAVIGATION:
+            return {"PASS_THROUGH"}
+        if event.type != "TIMER":
+            return {"RUNNING_MODAL"}
+        try:
+            self._advance(context)
+            return {"RUNNING_MODAL"}
+        except StopIteration as stop:
+            return self._complete(context, stop.value)
+        except (InputError, OSError) as error:
+            return self._fail(context, sentence(error))
+        except Exception as error:  # the modal handler must go, whatever happened
+            traceback.print_exc()
+            return self._fail(
+                context, f"{self.bl_label} failed ({type(error).__name__}: {error}). The console has more."
+            )
+
+    def cancel(self, context):
+        """Blender closes the window."""
+        self._end(context)
+
+    def _advance(self, context):
+        until = time.monotonic() + _SLICE
+        step = next(self._work)
+        while time.monotonic() < until:
+            step = next(self._work)
+        self._show(context, step)
+
+    def _complete(self, context, result):
+        self._end(context)
+        try:
+            message = self.finish(context, result)
+        except (InputError, OSError) as error:
+            self.report({"ERROR"}, sentence(error))
+            return {"CANCELLED"}
+        if message:
+            self.report({"INFO"}, message)
+        return {"FINISHED"}
+
+    def _fail(self, context, message):
+        self._end(context)
+        self.report({"ERROR"}, message)
+        return {"CANCELLED"}
+
+    def _show(self, context, step: Progress):
+        running.fraction, running.label = min(max(step.fraction, 0.0), 1.0), step.label
+        text = f"{self.bl_label}: {step.label}, {running.fraction:.0%}    |    Esc: cancel"
+        for window in context.window_manager.windows:
+            window.workspace.status_text_set(text)
+        _redraw_sidebars(context)
+
+    def _end(self, context):
+        global running
+        running = None
+        if self._work is not None:
+            self._work.close()
+            self._work = None
+        if self._timer is not None:
+            context.window_manager.event_timer_remove(self._timer)
+            self._timer = None
+        for window in context.window_manager.windows:
+            window.workspace.status_text_set(None)
+        _redraw_sidebars(context)
+
+
+def _redraw_sidebars(context):
+    for window in context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type == "VIEW_3D":
+                area.tag_redraw()

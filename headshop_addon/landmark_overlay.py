@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Landmarks drawn over the viewport: a point each, full where placed, a ring where estimated, names beside.
+
+Drawing reads the saved landmarks of the scan and keeps nothing.
+"""
+
+import blf
+import bpy
+from bpy_extras.view3d_utils import location_3d_to_region_2d
+from mathutils import Vector
+
+from . import active
+from .preferences import preferences
+
+PLACED = (0.25, 0.85, 1.0, 1.0)
+ESTIMATED = (1.0, 0.75, 0.25, 0.9)
+CHOSEN = (1.0, 1.0, 1.0, 1.0)
+SHADOW = (0.0, 0.0, 0.0, 0.8)
+
+#: The landmark being asked for by the clicking operator, drawn larger; empty when nobody asks.
+asked_for = ""
+_handles: list = []
+
+
+def points(context) -> list[tuple[str, str, Vector]]:
+    """(name, state, world position) of the landmarks there are to draw."""
+    settings = context.scene.headshop
+    scan = active.scan(context)
+    if not settings.show_landmarks or scan is None or not scan.visible_get():
+        return []
+    matrix = scan.matrix_world
+    return [(i.name, i.state, matrix @ Vector(i.co)) for i in scan.headshop.landmarks if i.state != "MISSING"]
+
+
+def _draw():
+    import gpu
+    from gpu_extras.batch import batch_for_shader
+
+    context = bpy.context
+    region, view = context.region, context.region_data
+    on_screen = [(n, s, location_3d_to_region_2d(region, view, p)) for n, s, p in points(context)]
+    on_screen = [(name, state, at) for name, state, at in on_screen if at is not None]
+    if not on_screen:
+        return
+    settings, chosen = preferences(context), _chosen(context)
+    scale = context.preferences.system.ui_scale
+    size = (settings.point_size if settings else 9.0) * scale
+    shader = gpu.shader.from_builtin("UNIFORM_COLOR")
+    gpu.state.blend_set("ALPHA")
+    for state, colour, factor in (("DERIVED", ESTIMATED, 0.6), ("PLACED", PLACED, 1.0)):
+        at = [p for n, s, p in on_screen if s == state and n != chosen]
+        _discs(shader, batch_for_shader, at, size * factor / 2, colour)
+    _discs(shader, batch_for_shader, [p for n, _, p in on_screen if n == chosen], size * 0.7, CHOSEN)
+    gpu.state.blend_set("NONE")
+    if context.scene.headshop.show_names:
+        blf.size(0, (settings.text_size if settings else 12) * scale)
+        for name, state, at in on_screen:
+            if state == "PLACED" or name == chosen:
+                _text(name, at.x + size * 0.7, at.y - size * 0.3, CHOSEN if name == chosen else PLACED)
+
+
+def _chosen(context) -> str:
+    if asked_for:
+        return asked_for
+    group = active.scan(context).headshop
+    return group.landmarks[group.landmark_index].name if group.landmark_index < len(group.landmarks) else ""
+
+
+def _discs(shader, batch_for_shader, centres, radius, colour):
+    """Filled discs with a dark rim; ten sides are round enough at this size."""
+    import math
+
+    circle = [(math.cos(k * math.tau / 12), math.sin(k * math.tau / 12)) for k in range(13)]
+    for grow, tint in ((1.5, SHADOW), (0.0, colour)):
+        triangles = []
+        for centre in centres:
+            rim = [(centre.x + (radius + grow) * x, centre.y + (radius + grow) * y) for x, y in circle]
+            for first, second in zip(rim, rim[1:], strict=False):
+                triangles += [(centre.x, centre.y), first, second]
+        if triangles:
+            shader.uniform_float("color", tint)
+            batch_for_shader(shader, "TRIS", {"pos": triangles}).draw(shader)
+
+
+def _text(text, x, y, colour):
+    for dx, dy, tint in ((1, -1, SHADOW), (0, 0, colour)):
+        blf.color(0, *tint)
+        blf.position(0, x + dx, y + dy, 0)
+        blf.draw(0, text)
+
+
+def register():
+    """Start drawing."""
+    _handles.append(bpy.types.SpaceView3D.draw_handler_add(_draw, (), "WINDOW", "POST_PIXEL"))
+
+
+def unregister():
+    """Stop drawing."""
+    while _handles:
+        bpy.types.SpaceView3D.draw_handler_remove(_handles.pop(), "WINDOW")

@@ -1,0 +1,219 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The face follows the sliders: the simulated pose is the shape key ``Live`` of the skin and of what moves along.
+
+Simulated models are cached here, one per skin, and made anew when the head they were made from is no longer the one in
+the scene (undo, reload, sculpting). The sliders are the truth; the cache and the shape key only follow.
+"""
+
+import zlib
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import bpy
+import numpy as np
+from bpy.app.handlers import persistent
+
+from ..sim.errors import InputError
+from . import bridge, dependencies, heads, muscle_names
+
+KEY = "Live"
+#: Iterations for one look: enough to follow a slider, continued by the next one.
+ITERATIONS = 40
+STILL = 0.001  # mm: a part that never moved more needs no key
+
+_depth = 0  # > 0 while nothing must follow
+
+
+@dataclass
+class _Following:
+    """What is simulated for one skin: its model, where it rests, the last state and the sliders it belongs to."""
+
+    fingerprint: int
+    model: Any
+    neutral: dict[str, np.ndarray]
+    state: Any
+    pose: tuple | None = None
+
+
+_following: dict[int, _Following] = {}
+
+
+@contextmanager
+def paused():
+    """While sliders are set in bulk or a bake runs; the face follows once when the outermost pause ends."""
+    global _depth
+    _depth += 1
+    try:
+        yield
+    finally:
+        _depth -= 1
+
+
+def on_slider(group, _context):
+    """A slider was moved."""
+    follow(group.id_data)
+
+
+def on_switch(group, _context):
+    """Live was switched on or off."""
+    skin = group.id_data
+    if not heads.is_skin(skin):
+        return
+    if group.live:
+        follow(skin)
+    else:
+        rest(skin)
+
+
+def sliders(skin, depsgraph=None) -> dict[str, float]:
+    """All muscles and controls of a head as they are now, animation included."""
+    group = (skin.evaluated_get(depsgraph) if depsgraph else skin).headshop
+    return {**group.muscles.values(), **group.controls.values()}
+
+
+def set_sliders(skin, values: dict[str, float]) -> None:
+    """Set the sliders named and all others to 0, with a single update of the face."""
+    with paused():
+        for group in (skin.headshop.muscles, skin.headshop.controls):
+            for name in group.values():
+                setattr(group, name, values.get(name, 0.0))
+    follow(skin)
+
+
+def key_sliders(skin, frame: int) -> None:
+    """Insert a keyframe for every slider."""
+    for kind in ("muscles", "controls"):
+        for name in getattr(skin.headshop, kind).values():
+            skin.keyframe_insert(f"headshop.{kind}.{name}", frame=frame, group="Head Shop")
+
+
+def rest(skin) -> None:
+    """Take the live pose off the head: its ``Live`` shape keys are removed."""
+    for obj in heads.parts_of(skin).values():
+        keys = obj.data.shape_keys
+        block = keys.key_blocks.get(KEY) if keys else None
+        if block is not None:
+            obj.shape_key_remove(block)
+            if len(keys.key_blocks) == 1:  # the basis we made alone
+                obj.shape_key_clear()
+    _following.pop(skin.session_uid, None)
+
+
+def follow(skin, depsgraph=None) -> None:
+    """Bring the head to where its sliders say; does nothing while paused, switched off, or not a head."""
+    if (
+        _depth
+        or not heads.is_skin(skin)
+        or not skin.headshop.live
+        or skin.library
+        or not dependencies.available("scipy")
+    ):
+        return
+    values = sliders(skin, depsgraph)
+    with paused():
+        try:
+            _solve(skin, values)
+        except InputError as error:
+            print(f"Head Shop: {error}")
+            _following.pop(skin.session_uid, None)
+
+
+def _solve(skin, values):
+    from ..sim.acting.pose import control, pose_from
+    from ..sim.tissue.posing import posed_parts
+    from ..sim.tissue.solver import solve
+
+    following = _current(skin, bool(any(values.values())))
+    pose = tuple(values.values())
+    if following is None or following.pose == pose:
+        return
+    known = {*following.model.muscle_names, *muscle_names.CONTROLS}
+    wanted = control(following.model, pose_from({name: v for name, v in values.items() if name in known}))
+    solution = solve(following.model, wanted, following.state, max_iterations=ITERATIONS)
+    following.state, following.pose = solution.state, pose
+    objects = heads.parts_of(skin)
+    for part, vertices in posed_parts(following.model, solution.state, wanted).items():
+        _write(skin, objects[part], vertices - following.neutral[part])
+
+
+def _current(skin, moving: bool) -> _Following | None:
+    """The simulation of this head, made where there is none; a head at rest that never moved needs none."""
+    mark = fingerprint(skin)
+    following = _following.get(skin.session_uid)
+    if following is not None and following.fingerprint == mark:
+        return following
+    keys = skin.data.shape_keys
+    if not moving and (keys is None or KEY not in keys.key_blocks):
+        return None
+    from ..sim.acting.pose import Pose, control
+    from ..sim.tissue.model import build_model
+    from ..sim.tissue.posing import posed_parts
+    from ..sim.tissue.solver import rest_state
+
+    model = build_model(heads.read_head(skin))
+    state = rest_state(model)
+    following = _Following(mark, model, posed_parts(model, state, control(model, Pose())), state)
+    _following[skin.session_uid] = following
+    return following
+
+
+def fingerprint(skin) -> int:
+    """A number that changes when the head's rest shape or anatomy does."""
+    mark = zlib.crc32(str(skin.get(heads.ANATOMY, "")).encode())
+    for obj in heads.parts_of(skin).values():
+        mark = zlib.crc32(np.ascontiguousarray(bridge.read_positions(obj)).tobytes(), mark)
+    return mark
+
+
+def _write(skin, obj, delta):
+    """Set the part's ``Live`` key to its rest shape plus ``delta`` (n, 3) mm, given in the skin's space."""
+    if obj != skin and KEY not in (obj.data.shape_keys.key_blocks if obj.data.shape_keys else ()):
+        if np.abs(delta).max(initial=0.0) < STILL:
+            return
+    block = bridge.ensure_shape_key(obj, KEY)
+    turn = np.linalg.inv(heads.placement(skin, obj)[:3, :3])
+    bridge.write_positions(obj, bridge.read_positions(obj) + delta @ turn.T, KEY)
+    if block.value != 1.0:
+        block.value = 1.0
+
+
+@persistent
+def _on_frame(scene, depsgraph=None):
+    for skin in heads.find_heads(scene):
+        follow(skin, depsgraph)
+
+
+@persistent
+def _on_history(*_):
+    """After undo, redo or loading a file the cache may speak of other heads; the fingerprint decides."""
+    for following in _following.values():
+        following.pose = None
+    for skin in heads.find_heads(bpy.context.scene):
+        follow(skin)
+
+
+@persistent
+def _on_load(*_):
+    _following.clear()
+
+
+_HANDLERS = (
+    ("frame_change_post", _on_frame),
+    ("undo_post", _on_history),
+    ("redo_post", _on_history),
+    ("load_post", _on_load),
+)
+
+
+def register():
+    """Follow the time line and undo."""
+    for name, handler in _HANDLERS:
+        getattr(bpy.app.handlers, name).append(handler)
+
+
+def unregister():
+    """Stop following; heads keep the pose they are in."""
+    for name, handler in _HANDLERS:
+        getattr(bpy.app.handlers, name).remove(handler)
+    _following.clear()

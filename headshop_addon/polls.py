@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Why a button is grey: polls of operators, with the reason for its tooltip."""
+
+from . import active, dependencies
+
+
+def library(cls, name: str) -> bool:
+    """A Python library is there."""
+    if reason := dependencies.reason(name):
+        cls.poll_message_set(reason)
+        return False
+    return True
+
+
+def object_mode(cls, context) -> bool:
+    """Nothing is being edited or sculpted, where meshes cannot be written."""
+    if context.mode != "OBJECT":
+        cls.poll_message_set("Leave edit, sculpt or paint mode first")
+        return False
+    return True
+
+
+def scan(cls, context) -> bool:
+    """There is a scan."""
+    if active.scan(context) is None:
+        cls.poll_message_set("Import a scan first")
+        return False
+    return True
+
+
+def head(cls, context) -> bool:
+    """There is a head."""
+    if active.skin(context) is None:
+        cls.poll_message_set("Build a head first")
+        return False
+    return True

@@ -1,0 +1,135 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What an artist sets and the .blend keeps: ``Scene.headshop`` and ``Object.headshop``.
+
+The sliders (``Object.headshop.muscles``, ``.controls``, on the skin object) are made from the reference head's muscles
+when the extension is enabled: one animatable property each.
+"""
+
+import bpy
+from bpy.props import (
+    BoolProperty,
+    CollectionProperty,
+    EnumProperty,
+    FloatProperty,
+    FloatVectorProperty,
+    IntProperty,
+    PointerProperty,
+)
+
+from . import heads, live, muscle_names
+
+#: How a landmark got its place.
+STATES = (
+    ("MISSING", "Missing", "Not placed yet", "BLANK1", 0),
+    ("DERIVED", "Estimated", "Carried over from the reference head by the landmarks already placed", "KEYFRAME", 1),
+    ("PLACED", "Placed", "Placed by hand or read from a file", "KEYFRAME_HLT", 2),
+)
+
+
+def _is_scan(_scene, obj):
+    return obj.type == "MESH" and obj.get(heads.PART, "scan") == "scan"
+
+
+def _is_skin(_scene, obj):
+    return heads.is_skin(obj)
+
+
+class HEADSHOP_PG_landmark(bpy.types.PropertyGroup):
+    """One landmark of a scan; ``name`` is its short name, such as ``prn``."""
+
+    co: FloatVectorProperty(name="Position", description="In the scan object's own space", size=3, subtype="XYZ")
+    state: EnumProperty(name="State", items=STATES)
+
+
+class _Sliders:
+    """Read all sliders of a group at once."""
+
+    def values(self) -> dict[str, float]:
+        """Slider name -> value."""
+        return {name: getattr(self, name) for name in self.bl_rna.properties.keys() if name not in ("rna_type", "name")}
+
+
+def _slider(label: str, description: str, lowest: float):
+    return FloatProperty(
+        name=label,
+        description=description,
+        min=lowest,
+        max=1.0,
+        default=0.0,
+        precision=2,
+        step=1,
+        subtype="FACTOR",
+        options={"ANIMATABLE"},
+        override={"LIBRARY_OVERRIDABLE"},
+        update=live.on_slider,
+    )
+
+
+class HEADSHOP_PG_muscles(_Sliders, bpy.types.PropertyGroup):
+    """Contraction of every muscle, 0 to 1."""
+
+
+class HEADSHOP_PG_controls(_Sliders, bpy.types.PropertyGroup):
+    """Jaw, lids and gaze."""
+
+
+class HEADSHOP_PG_object(bpy.types.PropertyGroup):
+    """Landmarks of a scan; sliders of a head's skin."""
+
+    landmarks: CollectionProperty(type=HEADSHOP_PG_landmark)
+    landmark_index: IntProperty(name="Landmark", description="The landmark chosen in the list")
+    muscles: PointerProperty(type=HEADSHOP_PG_muscles, override={"LIBRARY_OVERRIDABLE"})
+    controls: PointerProperty(type=HEADSHOP_PG_controls, override={"LIBRARY_OVERRIDABLE"})
+    live: BoolProperty(
+        name="Live",
+        description="The face follows the sliders. Off: the sliders move nothing, baked shape keys play alone",
+        default=True,
+        options=set(),
+        update=live.on_switch,
+    )
+
+
+class HEADSHOP_PG_scene(bpy.types.PropertyGroup):
+    """Settings of the sidebar."""
+
+    scan: PointerProperty(
+        name="Scan", description="The scan that landmarks are placed on", type=bpy.types.Object, poll=_is_scan
+    )
+    head: PointerProperty(
+        name="Head", description="The head that sliders and bakes work on", type=bpy.types.Object, poll=_is_skin
+    )
+    show_landmarks: BoolProperty(name="Show Landmarks", description="Draw landmarks in the viewport", default=True)
+    show_names: BoolProperty(name="Names", description="Write each placed landmark's name beside it", default=True)
+
+
+_CLASSES = (
+    HEADSHOP_PG_landmark,
+    HEADSHOP_PG_muscles,
+    HEADSHOP_PG_controls,
+    HEADSHOP_PG_object,
+    HEADSHOP_PG_scene,
+)
+
+
+def register():
+    """Make the sliders and attach the groups to scenes and objects."""
+    HEADSHOP_PG_muscles.__annotations__ = {
+        name: _slider(muscle_names.label(name), f"Contraction of {muscle_names.label(name).lower()}", 0.0)
+        for name in muscle_names.muscles()
+    }
+    HEADSHOP_PG_controls.__annotations__ = {
+        name: _slider(label, description, lowest)
+        for name, (label, lowest, description) in muscle_names.CONTROLS.items()
+    }
+    for cls in _CLASSES:
+        bpy.utils.register_class(cls)
+    bpy.types.Object.headshop = PointerProperty(type=HEADSHOP_PG_object, override={"LIBRARY_OVERRIDABLE"})
+    bpy.types.Scene.headshop = PointerProperty(type=HEADSHOP_PG_scene)
+
+
+def unregister():
+    """Detach and forget; the values stay in the .blend and come back when the extension does."""
+    del bpy.types.Scene.headshop
+    del bpy.types.Object.headshop
+    for cls in reversed(_CLASSES):
+        bpy.utils.unregister_class(cls)

@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Landmarks kept on a scan object: read, place, forget, and let the rest follow those that were placed.
+
+Positions are stored in the scan object's own space (metres, like its mesh) and handed out in mm.
+"""
+
+import numpy as np
+
+from ..sim.anatomy.landmark_names import SKIN
+from .bridge import METRES
+
+#: The order in which they are asked for: first what fixes place, size and tilt, then what shapes the face most.
+ORDER = (
+    *("prn", "ex_r", "ex_l", "ch_r", "ch_l", "gn", "n", "en_r", "en_l", "sn", "t_r", "t_l", "ls", "li", "sto", "pg"),
+    *("al_r", "al_l", "sl", "g", "zy_r", "zy_l", "go_r", "go_l", "sci_r", "sci_l", "ps_r", "ps_l", "pi_r", "pi_l"),
+    *("or_r", "or_l", "cph_r", "cph_l", "tr", "ft_r", "ft_l", "v", "op", "eu_r", "eu_l", "sa_r", "sa_l"),
+    *("sba_r", "sba_l", "pra_r", "pra_l", "pa_r", "pa_l", "obs_r", "obs_l", "obi_r", "obi_l", "os_r", "os_l"),
+    *("ac_r", "ac_l", "sbal_r", "sbal_l", "se"),
+)
+#: Landmarks needed before the others can follow, and before a head can be built.
+ENOUGH_TO_FOLLOW = 3
+ENOUGH_TO_BUILD = 4
+
+
+def entries(scan) -> dict:
+    """Landmark name -> its property on the scan; makes those that are not there yet."""
+    stored = scan.headshop.landmarks
+    if len(stored) != len(SKIN):
+        known = {item.name: (tuple(item.co), item.state) for item in stored}
+        stored.clear()
+        for name in SKIN:
+            item = stored.add()
+            item.name = name
+            item.co, item.state = known.get(name, ((0.0, 0.0, 0.0), "MISSING"))
+    return {item.name: item for item in stored}
+
+
+def positions(scan, *states: str) -> dict[str, np.ndarray]:
+    """Landmark -> (3,) mm of those in the given states; without any, of the placed ones."""
+    states = states or ("PLACED",)
+    return {i.name: np.array(i.co, dtype=float) / METRES for i in scan.headshop.landmarks if i.state in states}
+
+
+def put(scan, name: str, position, state: str = "PLACED") -> None:
+    """Set one landmark, position (3,) in mm."""
+    item = entries(scan)[name]
+    item.co = np.asarray(position, dtype=float) * METRES
+    item.state = state
+
+
+def forget(scan, *names: str) -> None:
+    """Take back the landmarks named, or all of them."""
+    for name, item in entries(scan).items():
+        if not names or name in names:
+            item.state = "MISSING"
+
+
+def replace(scan, placed: dict) -> None:
+    """Forget all landmarks, place the given ones (mm) and let the others follow."""
+    forget(scan)
+    for name, position in placed.items():
+        put(scan, name, position)
+    follow(scan)
+
+
+def follow(scan) -> None:
+    """Carry the landmarks that were not placed over from the reference head (Kähler 2002, 6.1).
+
+    With fewer than three placed, or where these lie on a line, there is nothing to follow: the others become missing.
+    """
+    from ..sim.adapt.completion import complete_landmarks
+    from ..sim.anatomy.storage import load_head
+    from ..sim.errors import InputError
+
+    given = positions(scan)
+    everything = {}
+    if len(given) >= ENOUGH_TO_FOLLOW:
+        try:
+            everything = complete_landmarks(load_head(), given)
+        except InputError:
+            everything = {}  # on a line: more clicks will cure it
+    for name, item in entries(scan).items():
+        if item.state != "PLACED":
+            item.state = "DERIVED" if name in everything else "MISSING"
+            if name in everything:
+                item.co = np.asarray(everything[name]) * METRES
+
+
+def snapshot(scan) -> tuple:
+    """All landmarks as they are, for `restore`."""
+    return tuple((item.name, tuple(item.co), item.state) for item in entries(scan).values())
+
+
+def restore(scan, taken: tuple) -> None:
+    """Put back what `snapshot` took."""
+    stored = entries(scan)
+    for name, co, state in taken:
+        stored[name].co, stored[name].state = co, state
+
+
+def next_to_place(scan, skipped=(), chosen: str | None = None) -> str | None:
+    """The landmark to ask for next: the chosen one, or the first in `ORDER` neither placed nor skipped."""
+    stored = entries(scan)
+    if chosen is not None:
+        return chosen
+    return next((n for n in ORDER if stored[n].state != "PLACED" and n not in skipped), None)

@@ -1,0 +1,147 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Scans as objects in the scene: brought in, adopted, given landmarks, made into heads.
+
+A scan object is always clean, in metres, upright and facing -Y in its own space; ``headshop_turn`` says by which
+rotation the axes of its file became these, so that landmark files stay in the file's axes.
+"""
+
+import json
+from pathlib import Path
+
+import bpy
+import numpy as np
+from mathutils import Matrix
+
+from ..sim.adapt.landmarks import read_landmarks, write_landmarks
+from ..sim.anatomy.landmark_names import SKIN
+from ..sim.errors import InputError
+from ..sim.progress import Work
+from ..sim.scan.orientation import Orientation
+from . import bridge, heads, pipeline, scan_landmarks
+
+TURN = "headshop_turn"
+
+
+def import_scan(context, path, unit: str | None = None, up: str | None = None) -> bpy.types.Object:
+    """Read a scan file into the scene and choose it; returns the object.
+
+    Raises
+    ------
+    InputError : the file cannot be read or is no head.
+    """
+    scan = pipeline.load_scan(path, None, unit, up)
+    return _add(context, scan, Path(path).stem)
+
+
+def add_sample(context, sample, with_landmarks: bool = True) -> bpy.types.Object:
+    """Put the sample subject's scan into the scene and choose it; returns the object."""
+    report = {"vertices": len(sample.scan.vertices), "triangles": len(sample.scan.triangles)}
+    obj = _add(context, pipeline.Scan(sample.scan, _upright(), report), "Sample")
+    if with_landmarks:
+        scan_landmarks.replace(obj, {name: p for name, p in sample.landmarks.items() if name in SKIN})
+    return obj
+
+
+def adopt(context, original: bpy.types.Object) -> bpy.types.Object:
+    """A clean, upright copy of a mesh object as the scan, in the original's place; the original is hidden.
+
+    Raises
+    ------
+    InputError : it is no head (`sim.scan.clean`, `sim.scan.orientation`).
+    """
+    scan = pipeline.prepare_scan(bridge.object_to_mesh(original))
+    obj = _add(context, scan, f"{original.name} Scan")
+    turn = scan.orientation.matrix  # mm to mm here: the translation is zero, so it serves for metres too
+    obj.matrix_world = original.matrix_world @ Matrix(np.linalg.inv(turn).tolist())
+    original.hide_set(True)
+    return obj
+
+
+def _add(context, scan, name: str) -> bpy.types.Object:
+    obj = pipeline.add_scan(scan, name, context.scene)
+    obj[heads.REPORT] = json.dumps({"scan": scan.report})
+    obj[TURN] = scan.orientation.rotation.ravel().tolist()
+    scan_landmarks.entries(obj)
+    context.scene.headshop.scan = obj
+    select(context, obj)
+    look_at(context)
+    return obj
+
+
+def _upright() -> Orientation:
+    """The orientation of what is upright already."""
+    return Orientation("mm", 1.0, "+Z", "-Y", np.eye(3), True, "Upright already.")
+
+
+def select(context, obj: bpy.types.Object) -> None:
+    """Make ``obj`` the only selected and the active object."""
+    for other in context.view_layer.objects.selected:
+        other.select_set(False)
+    obj.select_set(True)
+    context.view_layer.objects.active = obj
+
+
+def look_at(context) -> None:
+    """Turn the viewport to the front of what is selected and close to it; nothing without a window."""
+    area = context.area
+    if bpy.app.background or area is None or area.type != "VIEW_3D":
+        return
+    region = next(region for region in area.regions if region.type == "WINDOW")
+    with context.temp_override(area=area, region=region):
+        bpy.ops.view3d.view_axis(type="FRONT")
+        bpy.ops.view3d.view_selected()
+
+
+def summary(scan: bpy.types.Object) -> str:
+    """A sentence about a scan that came in."""
+    report = json.loads(scan.get(heads.REPORT, "{}")).get("scan", {})
+    return f"{scan.name}: {len(scan.data.polygons):,} faces. {report.get('orientation', '')}".strip()
+
+
+def _rotation(scan) -> np.ndarray:
+    return np.array(scan.get(TURN, np.eye(3).ravel())).reshape(3, 3)
+
+
+def load_landmarks(scan: bpy.types.Object, path) -> int:
+    """Replace the scan's landmarks by those of a file (mm, in the axes of the scan's file); returns how many.
+
+    Raises
+    ------
+    InputError : the file cannot be used (`sim.adapt.landmarks`).
+    """
+    turn = _rotation(scan)
+    read = {name: turn @ position for name, position in read_landmarks(path).items() if name in SKIN}
+    scan_landmarks.replace(scan, read)
+    return len(read)
+
+
+def save_landmarks(scan: bpy.types.Object, path) -> int:
+    """Write the placed landmarks to a file, in the axes of the scan's file; returns how many."""
+    turn = _rotation(scan)
+    placed = scan_landmarks.positions(scan)
+    write_landmarks(path, {n: p @ turn for n, p in placed.items()}, [n for n in SKIN if n not in placed])
+    return len(placed)
+
+
+def build(context, scan: bpy.types.Object, name: str = "") -> Work:
+    """Build a head from a scan object and its placed landmarks; returns (skin object, report).
+
+    The scene is left alone until everything is computed. The scan is hidden then: the head stands in its place.
+
+    Raises
+    ------
+    InputError : too few landmarks, or they do not fit the scan.
+    """
+    placed = scan_landmarks.positions(scan)
+    if len(placed) < scan_landmarks.ENOUGH_TO_BUILD:
+        raise InputError(f"{scan.name} has {len(placed)} landmarks: place at least {scan_landmarks.ENOUGH_TO_BUILD}.")
+    report = json.loads(scan.get(heads.REPORT, "{}")).get("scan", {})
+    prepared = pipeline.Scan(bridge.object_to_mesh(scan), _upright(), report)
+    skin, report = yield from pipeline.build(
+        prepared, placed, name or scan.name.removesuffix(" Scan"), scan, context.scene
+    )
+    skin.matrix_world = scan.matrix_world
+    scan.hide_set(True)
+    context.scene.headshop.head = skin
+    select(context, skin)
+    return skin, report

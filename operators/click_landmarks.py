@@ -1,0 +1,134 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Place landmarks by clicking the scan in the viewport."""
+
+import bpy
+
+from ..headshop_addon import active, dependencies, landmark_overlay, picking
+from ..headshop_addon import scan_landmarks as landmarks
+from ..headshop_addon.bridge import METRES
+from ..sim.anatomy.landmark_names import label
+
+_SKIP = {"RIGHTMOUSE", "N"}
+_END = {"ESC", "RET", "NUMPAD_ENTER"}
+
+
+class HEADSHOP_OT_click_landmarks(bpy.types.Operator):
+    """Click the landmarks on the scan, one after the other. After three, the rest follow and only need correcting"""
+
+    bl_idname = "headshop.click_landmarks"
+    bl_label = "Click Landmarks"
+    bl_options = {"REGISTER", "UNDO"}
+
+    start: bpy.props.StringProperty(name="Start With", description="Ask for this landmark first", options={"SKIP_SAVE"})
+
+    @classmethod
+    def poll(cls, context):
+        """Needs a scan and the warp."""
+        if active.scan(context) is None:
+            cls.poll_message_set("Import a scan first")
+            return False
+        if reason := dependencies.reason("scipy"):
+            cls.poll_message_set(reason)
+            return False
+        return True
+
+    def execute(self, context):
+        """Clicking needs a window."""
+        self.report({"ERROR"}, "Landmarks are clicked in a 3D viewport: use Load Landmarks without a window.")
+        return {"CANCELLED"}
+
+    def invoke(self, context, event):
+        """Begin asking."""
+        if context.area is None or context.area.type != "VIEW_3D":
+            self.report({"ERROR"}, "Landmarks are clicked in a 3D viewport: start from its sidebar.")
+            return {"CANCELLED"}
+        self._area = context.area
+        self._scan = active.scan(context)
+        self._steps = []
+        self._skipped = []
+        self._chosen = self.start or None
+        self._before = landmarks.snapshot(self._scan)
+        if landmarks.next_to_place(self._scan, (), self._chosen) is None:
+            self.report({"INFO"}, "All landmarks are placed: choose one in the list to place it anew.")
+            return {"CANCELLED"}
+        context.scene.headshop.show_landmarks = True
+        context.window.cursor_modal_set("CROSSHAIR")
+        context.window_manager.modal_handler_add(self)
+        self._ask(context)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context, event):
+        """Click places, Ctrl-Z takes back, N or the right button skips, Esc or Enter ends; the view can be turned."""
+        if event.type in _END and event.value == "PRESS":
+            return self._end(context)
+        if event.type == "Z" and (event.ctrl or event.oskey) and event.value == "PRESS":
+            self._take_back(context)
+            return {"RUNNING_MODAL"}
+        if event.type == "LEFTMOUSE" and event.value in {"PRESS", "DOUBLE_CLICK"}:
+            region = picking.viewport_region(self._area, event.mouse_x, event.mouse_y)
+            if (
+                region is None
+            ):  # the artist has turned to a button: keep what there is and let the button have its click
+                return self._end(context) | {"PASS_THROUGH"}
+            return self._click(context, region, (event.mouse_x - region.x, event.mouse_y - region.y))
+        if event.type in _SKIP and event.value == "PRESS":
+            self._remember()
+            self._skipped.append(self._name)
+            self._chosen = None
+            return self._ask(context)
+        if event.type in {"LEFTMOUSE", "RIGHTMOUSE", "Z"}:
+            return {"RUNNING_MODAL"}
+        return {"PASS_THROUGH"}
+
+    def cancel(self, context):
+        """Blender closes the window."""
+        self._finish(context)
+
+    def _click(self, context, region, at):
+        hit = picking.on_surface(context, self._area, region, at, self._scan)
+        if hit is None:
+            self.report({"WARNING"}, "Click on the scan, or skip this landmark with N.")
+            return {"RUNNING_MODAL"}
+        self._remember()
+        landmarks.put(self._scan, self._name, hit / METRES)
+        landmarks.follow(self._scan)
+        self._chosen = None
+        return self._ask(context)
+
+    def _remember(self):
+        self._steps.append((landmarks.snapshot(self._scan), list(self._skipped), self._chosen))
+
+    def _take_back(self, context):
+        if self._steps:
+            taken, self._skipped, self._chosen = self._steps.pop()
+            landmarks.restore(self._scan, taken)
+            self._ask(context)
+
+    def _ask(self, context):
+        """Name the next landmark, or end when none is left."""
+        self._name = landmarks.next_to_place(self._scan, self._skipped, self._chosen)
+        if self._name is None:
+            return self._end(context)
+        landmark_overlay.asked_for = self._name
+        count = len(landmarks.positions(self._scan))
+        self._area.header_text_set(f"Click {self._name}: {label(self._name)}   ({count} placed)")
+        context.workspace.status_text_set(
+            "Click: place   |   N or right click: skip   |   Ctrl Z: take back   |   Esc or Enter: end and keep"
+        )
+        self._area.tag_redraw()
+        return {"RUNNING_MODAL"}
+
+    def _finish(self, context):
+        landmark_overlay.asked_for = ""
+        self._area.header_text_set(None)
+        self._area.tag_redraw()
+        context.workspace.status_text_set(None)
+        context.window.cursor_modal_restore()
+
+    def _end(self, context):
+        self._finish(context)
+        if landmarks.snapshot(self._scan) == self._before:
+            return {"CANCELLED"}
+        count = len(landmarks.positions(self._scan))
+        self.report({"INFO"}, f"{count} landmarks placed on {self._scan.name}")
+        return {"FINISHED"}

@@ -1,0 +1,39 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Write the head for a game engine."""
+
+import bpy
+from bpy_extras.io_utils import ExportHelper
+
+from ..headshop_addon import active, polls
+from ..headshop_addon.jobs import Simple
+
+
+class HEADSHOP_OT_export_head(Simple, ExportHelper, bpy.types.Operator):
+    """Write the head with its baked shapes as glTF, FBX or USD"""
+
+    bl_idname = "headshop.export_head"
+    bl_label = "Export Head"
+    bl_options = {"REGISTER"}
+
+    filter_glob: bpy.props.StringProperty(default="*.glb;*.fbx;*.usdc", options={"HIDDEN"})
+    kind: bpy.props.EnumProperty(
+        name="Format",
+        items=((".glb", "glTF", "One binary file"), (".fbx", "FBX", ""), (".usdc", "USD", "One binary file")),
+    )
+
+    @property
+    def filename_ext(self):
+        """The extension that belongs to the format."""
+        return self.kind
+
+    @classmethod
+    def poll(cls, context):
+        """Needs a head."""
+        return polls.library(cls, "scipy") and polls.head(cls, context) and polls.object_mode(cls, context)
+
+    def act(self, context):
+        """Export."""
+        from ..headshop_addon.export import export_head
+
+        names = export_head(active.skin(context), self.filepath)
+        return f"{self.filepath}: {len(names)} shapes"

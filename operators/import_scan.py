@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Read a scan file."""
+
+import bpy
+from bpy_extras.io_utils import ImportHelper
+
+from ..headshop_addon import polls
+from ..headshop_addon.jobs import Simple
+
+UNITS = (
+    ("AUTO", "Detect", "Judge by the size of the head"),
+    ("mm", "Millimetres", ""),
+    ("cm", "Centimetres", ""),
+    ("m", "Metres", ""),
+    ("in", "Inches", ""),
+)
+UP = (
+    ("AUTO", "Detect", "Judge by the shape of the head"),
+    *(
+        (axis, axis, f"The crown of the head points along {axis} in the file")
+        for axis in ("+Z", "+Y", "+X", "-X", "-Y", "-Z")
+    ),
+)
+
+
+class HEADSHOP_OT_import_scan(Simple, ImportHelper, bpy.types.Operator):
+    """Read a head scan (PLY, OBJ, STL, glTF, USD, FBX), clean it and set it upright in real size"""
+
+    bl_idname = "headshop.import_scan"
+    bl_label = "Import Scan"
+    bl_options = {"REGISTER", "UNDO"}
+
+    filename_ext = ""
+    filter_glob: bpy.props.StringProperty(
+        default="*.ply;*.obj;*.stl;*.glb;*.gltf;*.usd;*.usda;*.usdc;*.usdz;*.fbx", options={"HIDDEN"}
+    )
+    unit: bpy.props.EnumProperty(name="Unit", description="Unit of length in the file", items=UNITS)
+    up: bpy.props.EnumProperty(name="Up", description="Direction of the crown of the head in the file", items=UP)
+
+    @classmethod
+    def poll(cls, context):
+        """Needs the cleaning code."""
+        return polls.library(cls, "scipy") and polls.object_mode(cls, context)
+
+    def act(self, context):
+        """Read, clean, turn upright, add."""
+        from ..headshop_addon import scan_objects
+
+        unit, up = (None if value == "AUTO" else value for value in (self.unit, self.up))
+        scan = scan_objects.import_scan(context, self.filepath, unit, up)
+        return scan_objects.summary(scan)

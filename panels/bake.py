@@ -1,0 +1,42 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Panel 6: bake to shape keys, take the head elsewhere."""
+
+import bpy
+
+from ..headshop_addon import active, dependencies
+from .common import SidebarPanel, hint, progress
+
+
+class HEADSHOP_PT_bake(SidebarPanel, bpy.types.Panel):
+    """Bake, render, export."""
+
+    bl_label = "Bake"
+
+    def draw(self, context):
+        """Shape keys, animation, pictures and files."""
+        layout = self.layout
+        if progress(layout):
+            return
+        skin = active.skin(context)
+        if skin is None:
+            hint(layout, context, "There is nothing to bake yet: build a head first.")
+            return
+        column = layout.column(align=True)
+        column.operator("headshop.bake_expressions", text="Expressions to Shape Keys", icon="SHAPEKEY_DATA")
+        column.operator("headshop.bake_muscles", text="Muscles to Shape Keys", icon="SHAPEKEY_DATA")
+        column = layout.column(align=True)
+        column.operator("headshop.bake_performance", text="Keyed Sliders to Animation", icon="ACTION")
+        if dependencies.available("scipy"):
+            from ..headshop_addon.shape_keys import baked_names
+
+            count = len(baked_names(skin))
+            if count:
+                layout.label(text=f"{count} shapes baked", icon="CHECKMARK")
+        column = layout.column(align=True)
+        column.operator("headshop.render_sheet", icon="RENDER_STILL")
+        column.operator("headshop.export_head", icon="EXPORT")
+
+
+def classes():
+    """In order of registration."""
+    return (HEADSHOP_PT_bake,)

@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Panel 3: from scan and landmarks to a head."""
+
+import bpy
+
+from ..headshop_addon import active, dependencies, heads, scan_landmarks
+from .common import SidebarPanel, hint, progress
+
+#: Key in the fit report -> what to call it.
+_FIT = (("mean_mm", "Mean distance"), ("p95_mm", "95 % within"), ("landmark_mean_mm", "Landmarks"))
+
+
+class HEADSHOP_PT_build(SidebarPanel, bpy.types.Panel):
+    """Build the head."""
+
+    bl_label = "Build"
+
+    def draw(self, context):
+        """One big button, then what came out of it."""
+        layout = self.layout
+        if progress(layout):
+            return
+        row = layout.row()
+        row.scale_y = 1.4
+        row.operator("headshop.build_head", icon="USER")
+        scan, skin = active.scan(context), active.skin(context)
+        if scan is None and skin is None:
+            hint(layout, context, "A head is built from a scan with landmarks.")
+        elif skin is None and len(scan_landmarks.positions(scan)) < scan_landmarks.ENOUGH_TO_BUILD:
+            hint(layout, context, "Place at least four landmarks on the scan first.")
+        elif skin is None:
+            hint(layout, context, "Ready: this takes some seconds.", "CHECKMARK")
+        if skin is not None:
+            _result(layout, context, skin)
+
+
+def _result(layout, context, skin):
+    fit = heads.read_report(skin).get("fit", {})
+    box = layout.box().column(align=True)
+    box.label(text=heads.head_name(skin), icon="OUTLINER_OB_MESH")
+    for key, text in _FIT:
+        if key in fit:
+            row = box.row()
+            row.label(text=text)
+            side = row.row()
+            side.alignment = "RIGHT"
+            side.label(text=f"{fit[key]:.2f} mm")
+    column = layout.column(align=True)
+    column.operator("headshop.dress_head", icon="MATERIAL")
+    column.operator("headshop.repack_uv", icon="UV")
+    if not dependencies.available("xatlas"):
+        hint(layout, context, "Repacking UVs needs the library xatlas, which this Blender does not have.")
+
+
+def classes():
+    """In order of registration."""
+    return (HEADSHOP_PT_build,)

@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Panel 2: landmarks on the scan."""
+
+import bpy
+
+from ..headshop_addon import active, scan_landmarks
+from ..sim.anatomy.landmark_names import LABELS, SKIN, label
+from .common import SidebarPanel, hint
+
+_ICONS = {"PLACED": "KEYFRAME_HLT", "DERIVED": "KEYFRAME", "MISSING": "BLANK1"}
+
+
+class HEADSHOP_UL_landmarks(bpy.types.UIList):
+    """Landmarks with their state."""
+
+    def draw_item(self, context, layout, data, item, icon, active_data, active_property, index):
+        """State, short name, long name."""
+        split = layout.split(factor=0.3)
+        split.label(text=item.name, icon=_ICONS[item.state])
+        split.label(text=LABELS[item.name.partition("_")[0]].partition(",")[0].capitalize())
+
+
+class HEADSHOP_PT_landmarks(SidebarPanel, bpy.types.Panel):
+    """Place landmarks."""
+
+    bl_label = "Landmarks"
+
+    def draw(self, context):
+        """Click, load, save; then the list."""
+        layout, settings = self.layout, context.scene.headshop
+        scan = active.scan(context)
+        if scan is None:
+            hint(layout, context, "Landmarks are placed on a scan: import one first.")
+            return
+        placed = len(scan_landmarks.positions(scan))
+        column = layout.column(align=True)
+        row = column.row(align=True)
+        row.scale_y = 1.4
+        row.operator("headshop.click_landmarks", icon="RESTRICT_SELECT_OFF")
+        row = column.row(align=True)
+        row.operator("headshop.load_landmarks", text="Load", icon="FILE_FOLDER")
+        row.operator("headshop.save_landmarks", text="Save", icon="FILE_TICK")
+        row.operator("headshop.clear_landmarks", text="Clear", icon="TRASH")
+        estimated = len(scan_landmarks.positions(scan, "DERIVED"))
+        if placed == 0:
+            hint(layout, context, "Click the points you are asked for; four are enough, twelve are good.")
+        elif placed < scan_landmarks.ENOUGH_TO_BUILD:
+            wanted = scan_landmarks.ENOUGH_TO_BUILD - placed
+            hint(layout, context, f"{placed} placed, {wanted} more needed to build a head.")
+        else:
+            text = f"{placed} placed" + (f", {estimated} estimated" if estimated else "")
+            layout.label(text=text, icon="CHECKMARK")
+        row = layout.row(align=True)
+        row.prop(settings, "show_landmarks", text="Show", toggle=True)
+        row.prop(settings, "show_names", toggle=True)
+
+
+class HEADSHOP_PT_landmark_list(SidebarPanel, bpy.types.Panel):
+    """All landmarks, to place one of them anew."""
+
+    bl_label = "All Landmarks"
+    bl_parent_id = "HEADSHOP_PT_landmarks"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context):
+        """Needs a scan whose landmarks were begun."""
+        scan = active.scan(context)
+        return scan is not None and len(scan.headshop.landmarks) == len(SKIN)
+
+    def draw(self, context):
+        """The list and what to do with its chosen one."""
+        layout = self.layout
+        group = active.scan(context).headshop
+        layout.template_list("HEADSHOP_UL_landmarks", "", group, "landmarks", group, "landmark_index", rows=6)
+        if 0 <= group.landmark_index < len(group.landmarks):
+            name = group.landmarks[group.landmark_index].name
+            hint(layout, context, label(name).capitalize() + ".")
+            layout.operator("headshop.click_landmarks", text=f"Place {name}", icon="RESTRICT_SELECT_OFF").start = name
+
+
+def classes():
+    """In order of registration."""
+    return (HEADSHOP_UL_landmarks, HEADSHOP_PT_landmarks, HEADSHOP_PT_landmark_list)

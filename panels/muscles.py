@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Panel 4: muscles, jaw, lids and gaze as sliders."""
+
+import bpy
+
+from ..headshop_addon import active, heads, muscle_names
+from .common import SidebarPanel, hint
+
+
+class HEADSHOP_PT_muscles(SidebarPanel, bpy.types.Panel):
+    """Contract muscles and see the face follow."""
+
+    bl_label = "Muscles"
+
+    def draw(self, context):
+        """Which head, whether it follows, and what to do with all sliders."""
+        layout = self.layout
+        skin = active.skin(context)
+        if skin is None:
+            hint(layout, context, "Muscles belong to a head: build one first.")
+            return
+        if len(heads.find_heads(context.scene)) > 1:
+            layout.label(text=heads.head_name(skin), icon="OUTLINER_OB_MESH")
+        layout.prop(skin.headshop, "live", text="Face Follows Sliders", toggle=True, icon="PLAY")
+        row = layout.row(align=True)
+        row.operator("headshop.key_sliders", text="Key All", icon="KEY_HLT")
+        row.operator("headshop.reset_muscles", icon="LOOP_BACK")
+
+
+class _Sliders(SidebarPanel):
+    """A sub-panel of sliders; exists once there is a head."""
+
+    bl_parent_id = "HEADSHOP_PT_muscles"
+
+    @classmethod
+    def poll(cls, context):
+        """Needs a head."""
+        return active.skin(context) is not None
+
+
+class HEADSHOP_PT_controls(_Sliders, bpy.types.Panel):
+    """Jaw, lids, gaze."""
+
+    bl_label = "Jaw, Lids and Gaze"
+
+    def draw(self, context):
+        """The jaw above, then left and right beside each other as on the screen."""
+        group = active.skin(context).headshop.controls
+        column = self.layout.column(align=True)
+        for name in ("jaw_open", "jaw_forward", "jaw_side"):
+            column.prop(group, name, text=f"Jaw {muscle_names.CONTROLS[name][0]}", slider=True)
+        row = self.layout.row(align=True)
+        row.prop(group, "blink_r", text="Blink R", slider=True)
+        row.prop(group, "blink_l", text="Blink L", slider=True)
+        row = self.layout.row(align=True)
+        row.prop(group, "gaze_x", text="Look Side", slider=True)
+        row.prop(group, "gaze_z", text="Look Up", slider=True)
+
+
+def _draw_region(self, context):
+    """Each muscle's name, and under it its sides: the subject's right on the left, as one sees the face."""
+    group = active.skin(context).headshop.muscles
+    for names in muscle_names.by_region()[self.bl_label]:
+        column = self.layout.column(align=True)
+        if len(names) == 1:
+            column.prop(group, names[0], slider=True)
+            continue
+        column.label(text=muscle_names.label(muscle_names.base(names[0])))
+        row = column.row(align=True)
+        for name in names:
+            row.prop(group, name, text=name[-1].upper(), slider=True)
+
+
+def _region_panel(number: int, region: str) -> type:
+    body = {"bl_label": region, "bl_options": {"DEFAULT_CLOSED"}, "draw": _draw_region, "__module__": __name__}
+    return type(
+        f"HEADSHOP_PT_muscles_{number}", (_Sliders, bpy.types.Panel), {**body, "__doc__": f"Muscles: {region}."}
+    )
+
+
+def classes():
+    """In order of registration; a sub-panel for every region that has muscles."""
+    regions = [_region_panel(number, region) for number, region in enumerate(muscle_names.by_region())]
+    return (HEADSHOP_PT_muscles, HEADSHOP_PT_controls, *regions)

@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Panel 1: the scan."""
+
+import json
+
+import bpy
+
+from ..headshop_addon import active, heads
+from .common import SidebarPanel, hint, needs, progress
+
+
+class HEADSHOP_PT_scan(SidebarPanel, bpy.types.Panel):
+    """Bring a scan in."""
+
+    bl_label = "Scan"
+
+    def draw(self, context):
+        """Import, sample, chosen scan and what is known about it."""
+        layout, settings = self.layout, context.scene.headshop
+        progress(layout)
+        if needs(layout, context, "scipy"):
+            return
+        column = layout.column(align=True)
+        column.operator("headshop.import_scan", icon="IMPORT")
+        row = column.row(align=True)
+        row.operator("headshop.make_sample", text="Sample", icon="USER")
+        row.operator("headshop.choose_scan", text="Use Active", icon="RESTRICT_SELECT_OFF")
+        scan = active.scan(context)
+        if scan is None:
+            hint(layout, context, "Start here: import the scan of a head, or add the sample to try things out.")
+            return
+        layout.prop(settings, "scan", text="")
+        _facts(layout, scan)
+
+
+def _facts(layout, scan):
+    facts = json.loads(scan.get(heads.REPORT, "{}")).get("scan", {})
+    column = layout.column(align=True)
+    column.scale_y = 0.85
+    size = max(scan.dimensions) * 1000
+    column.label(text=f"{len(scan.data.polygons):,} faces, {size:.0f} mm", icon="MESH_DATA")
+    removed = sum(v for k, v in facts.items() if k.startswith(("removed", "dropped")) and isinstance(v, int))
+    if removed:
+        column.label(text=f"{removed:,} faulty elements removed", icon="BRUSH_DATA")
+
+
+def classes():
+    """In order of registration."""
+    return (HEADSHOP_PT_scan,)
