@@ -8,6 +8,8 @@ from ..sim.errors import InputError
 from ..sim.progress import Work, portion
 from . import heads, performance, pipeline, shape_keys
 
+SETS = ("expressions", "muscles")
+
 
 def poses_of_set(skin: bpy.types.Object, name: str) -> dict:
     """Pose name -> Pose of the set ``expressions`` or ``muscles``.
@@ -16,10 +18,12 @@ def poses_of_set(skin: bpy.types.Object, name: str) -> dict:
     ------
     InputError : there is no such set.
     """
-    if name == "expressions":
-        return expressions.expressions()
-    if name == "muscles":
-        return expressions.muscle_poses(heads.read_head(skin))
+    if name in SETS:
+        head = heads.read_head(skin)
+        if name == "muscles":
+            return expressions.muscle_poses(head)
+        names = [muscle.name for muscle in head.muscles]
+        return {key: expressions.for_head(pose, names) for key, pose in expressions.expressions().items()}
     raise InputError(f"The set {name} is not in this version: bake --set muscles or --set expressions.")
 
 
@@ -51,7 +55,7 @@ def bake(skin: bpy.types.Object, pose_set: str | None = None, acted=None) -> Wor
 def bake_acted(skin: bpy.types.Object, acted, scene: bpy.types.Scene | None = None) -> Work:
     """Bake a performance from frame 1 on, at its own frame rate, which becomes the scene's."""
     scene = scene or bpy.context.scene
-    poses = acted.poses()
+    poses = acted.frames()
     report = yield from performance.bake_performance(skin, poses)
     scene.render.fps, scene.render.fps_base = round(acted.fps), round(acted.fps) / acted.fps
     scene.frame_start, scene.frame_end = 1, max(len(poses), 1)

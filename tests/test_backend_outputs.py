@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Outputs appear whole or not at all; motions compress to few shapes."""
+
+import numpy as np
+import pytest
+from headshop.headshop_addon.outputs import Outputs
+from headshop.sim.acting.principal import principal_shapes
+from headshop.sim.errors import InputError
+
+
+def test_all_files_appear_in_the_end(tmp_path):
+    (tmp_path / "old").mkdir()
+    (tmp_path / "old" / "b.txt").write_text("from an earlier run")
+    with Outputs() as outputs:
+        outputs.file(tmp_path / "new" / "deep" / "a.txt").write_text("a")
+        (outputs.folder(tmp_path / "old", ["a.txt", "b.txt"]) / "a.txt").write_text("fresh")
+        assert not (tmp_path / "new" / "deep" / "a.txt").exists()
+    assert sorted(p.relative_to(tmp_path).as_posix() for p in tmp_path.rglob("*")) == [
+        *("new", "new/deep", "new/deep/a.txt", "old", "old/a.txt")
+    ]
+
+
+def test_nothing_is_left_of_an_interruption(tmp_path):
+    (tmp_path / "old.txt").write_text("old")
+    with pytest.raises(KeyboardInterrupt), Outputs() as outputs:
+        outputs.file(tmp_path / "old.txt").write_text("half")
+        outputs.file(tmp_path / "new" / "a.txt").write_text("half")
+        raise KeyboardInterrupt
+    assert [p.name for p in tmp_path.rglob("*")] == ["old.txt"]
+    assert (tmp_path / "old.txt").read_text() == "old"
+
+
+def test_a_place_that_cannot_be_written_is_refused_at_once(tmp_path):
+    (tmp_path / "file").write_text("")
+    for place in (tmp_path / "file" / "a.txt", tmp_path):
+        with pytest.raises(InputError, match="give"), Outputs() as outputs:
+            outputs.file(place)
+    assert [p.name for p in tmp_path.rglob("*")] == ["file"]
+
+
+def test_a_rigid_motion_needs_at_most_twelve_shapes():
+    rng = np.random.default_rng(0)
+    points = rng.normal(size=(300, 3)) * 50
+    motion = np.empty((60, 300, 3))
+    for k in range(60):
+        rotation = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+        motion[k] = points @ rotation.T + rng.normal(size=3) - points
+    found = principal_shapes(motion, 0.001)
+    assert len(found.shapes) == 12
+    assert np.linalg.norm(np.einsum("fk,kni->fni", found.weights, found.shapes) - motion, axis=2).max() <= 0.001
+    np.testing.assert_allclose(np.abs(found.weights).max(axis=0), 1)
+
+
+def test_the_fewest_shapes_within_the_tolerance():
+    rng = np.random.default_rng(1)
+    strong = np.einsum("fk,kni->fni", rng.normal(size=(40, 3)), rng.normal(size=(3, 100, 3)))
+    weak = 1e-5 * rng.normal(size=(40, 100, 3))
+    found = principal_shapes(strong + weak, 0.001)
+    assert len(found.shapes) == 3 and 0 < found.error <= 0.001
+    assert len(principal_shapes(strong + weak, 1e-9).shapes) == 40
+    assert len(principal_shapes(np.zeros((5, 10, 3)), 0.001).shapes) == 0
