@@ -172,8 +172,8 @@ def _units(points, unit) -> list[tuple[str, float]]:
     units = [(name, scale) for name, scale in UNITS.items() if PLAUSIBLE[0] <= extent * scale <= PLAUSIBLE[1]]
     if not units:
         raise InputError(
-            f"The scan is {extent:.4g} units across, which is no head in mm, cm, m or inches: give the unit, as a name or "
-            "as millimetres per unit."
+            f"The scan is {extent:.4g} units across, which is no head in mm, cm, m or inches: give the unit, as a name "
+            "or as millimetres per unit."
         )
     return units
 

@@ -1,0 +1,155 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Make an individual of the reference head: measurements drawn from norms, the rest as smooth as can be.
+
+Each measurement of ``assets/tables/face_variation.csv`` is a linear functional of a displacement field over the head.
+Among all fields that change the measurements as drawn, the smoothest is taken: the mean of a Gaussian process
+(Rasmussen and Williams 2006, equation 2.25). It is smooth everywhere, so no landmark shows.
+"""
+
+import csv
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from ..anatomy.head import Eye, Head
+
+TABLE = Path(__file__).resolve().parents[2] / "assets" / "tables" / "face_variation.csv"
+
+#: Gaussian kernels of the field: reach in mm and share of the variance.
+SCALES = ((80.0, 0.5), (38.0, 0.3), (18.0, 0.2))
+#: All measurements of one person lean the same way: how much of each is the person's size.
+SIZE_SHARE = 0.35
+#: Measurements need not be met exactly, they contradict each other a little: fraction of the field's own deviation.
+SLACK = 0.12
+#: Left and right differ by about this much, mm, over patches of this reach.
+ASYMMETRY, PATCH = 0.55, 32.0
+#: Within this distance of the eyeball the skin keeps its distance to it, mm; beyond the second it is free.
+EYE_NEAR, EYE_FAR = 2.5, 11.0
+
+
+@dataclass(frozen=True, eq=False)
+class Field:
+    """A smooth displacement: ``sources`` (s, 3) mm, ``strength`` (s, 3), and small patches of one kernel."""
+
+    sources: np.ndarray
+    strength: np.ndarray
+    patches: np.ndarray
+    patch_strength: np.ndarray
+
+    def __call__(self, points: np.ndarray) -> np.ndarray:
+        """Displacement (n, 3) mm at points (n, 3) mm."""
+        points = np.asarray(points, dtype=float)
+        apart = _squared(points, self.patches)
+        return _kernel(points, self.sources) @ self.strength + np.exp(-apart / (2 * PATCH**2)) @ self.patch_strength
+
+
+def draw_field(landmarks: dict[str, np.ndarray], rng: np.random.Generator, strength: float = 1.0) -> Field:
+    """The field of one random person; ``strength`` 1 is the variance of the norms, 0 the reference itself."""
+    points, functionals, deviations, of = _functionals(landmarks)
+    draws = np.sqrt(1 - SIZE_SHARE) * rng.standard_normal(of.max() + 1) + np.sqrt(SIZE_SHARE) * rng.standard_normal()
+    target = strength * np.clip(draws, -2.2, 2.2)[of] * deviations  # beyond, people look odd
+    gram = np.einsum("apk,pq,bqk->ab", functionals, _kernel(points, points), functionals)
+    weights = np.linalg.solve(gram + SLACK**2 * np.diag(np.diag(gram)), target)
+    positions = np.array(list(landmarks.values()))
+    patches = positions[rng.choice(len(positions), 14, replace=False)]
+    return Field(
+        points,
+        np.einsum("a,apk->pk", weights, functionals),
+        patches,
+        strength * ASYMMETRY * rng.standard_normal(patches.shape),
+    )
+
+
+def individual(reference: Head, rng: np.random.Generator, strength: float = 1.0) -> Head:
+    """A person: every part of ``reference`` displaced by one random field; eyeballs stay round, lids stay on them."""
+    field = draw_field(reference.landmark_positions(), rng, strength)
+    balls = [(eye, field(eye.centre[None])[0]) for eye in reference.eyes]
+
+    def moved(points):
+        points = np.asarray(points, dtype=float)
+        flat = points.reshape(-1, 3)
+        out = flat + field(flat)
+        for eye, shift in balls:
+            out = _keep_on_ball(flat, out, eye, shift)
+        return out.reshape(points.shape)
+
+    parts = {name: moved(mesh.vertices) for name, mesh in reference.parts.items()}
+    for name, (_, shift) in zip(("eye_l", "eye_r"), balls, strict=True):
+        parts[name] = reference.parts[name].vertices + shift
+    muscles = tuple(
+        replace(
+            m,
+            fibres=moved(m.fibres),
+            centre=None if m.centre is None else moved(m.centre),
+            shape=m.shape.moved(moved(m.shape.vertices)),
+        )
+        for m in reference.muscles
+    )
+    jaw = replace(reference.jaw, **{k: moved(getattr(reference.jaw, k)) for k in ("condyle_l", "condyle_r", "incisor")})
+    eyes = tuple(Eye(eye.centre + shift, eye.radius, eye.gaze) for eye, shift in balls)
+    return replace(reference.with_vertices(parts), muscles=muscles, jaw=jaw, eyes=eyes)
+
+
+def _keep_on_ball(before, after, eye, shift):
+    """Near the eyeball the distance to it is as it was: the lids neither sink in nor stand off."""
+    was = np.linalg.norm(before - eye.centre, axis=1)
+    ray = after - (eye.centre + shift)
+    now = np.linalg.norm(ray, axis=1)
+    free = np.clip((was - eye.radius - EYE_NEAR) / (EYE_FAR - EYE_NEAR), 0, 1)
+    free = free * free * (3 - 2 * free)
+    length = was + free * (now - was)
+    return eye.centre + shift + ray * (length / np.maximum(now, 1e-9))[:, None]
+
+
+def _squared(a, b):
+    return np.maximum((a * a).sum(axis=1)[:, None] + (b * b).sum(axis=1) - 2 * a @ b.T, 0)
+
+
+def _kernel(a, b):
+    apart = _squared(a, b)
+    return sum(share * np.exp(-apart / (2 * reach**2)) for reach, share in SCALES)
+
+
+def _functionals(landmarks):
+    """Points (p, 3), functionals (a, p, 3) of displacements there, deviations (a,) mm, row of the table (a,).
+
+    A row with * stands for both sides, which are drawn alike.
+    """
+    points, index, rows, deviations, of = [], {}, [], [], []
+
+    def at(text):
+        """The indices of the points in ``text``: landmarks, or the middle of several joined by +."""
+        found = []
+        for name in text.split():
+            if name not in index:
+                index[name] = len(points)
+                points.append(np.mean([landmarks[part] for part in name.split("+")], axis=0))
+            found.append(index[name])
+        return found
+
+    with open(TABLE, newline="", encoding="utf-8") as file:
+        table = list(csv.DictReader(file))
+    for number, row in enumerate(table):
+        both = "*" in row["at"] + row["from"]
+        for side, sign in (("l", 1.0), ("r", -1.0)) if both else (("", 1.0),):
+            ends = [at(row[end].replace("*", side)) for end in ("at", "from")]
+            axis = row["axis"]
+            if axis == "along":
+                direction = np.mean([points[i] for i in ends[0]], axis=0) - np.mean(
+                    [points[i] for i in ends[1]], axis=0
+                )
+                direction = direction / np.linalg.norm(direction)
+            elif axis == "out":
+                direction = np.array([sign, 0, 0])
+            else:
+                direction = (-1.0 if axis[0] == "-" else 1.0) * np.eye(3)["xyz".index(axis[-1])]
+            rows.append((ends, direction))
+            deviations.append(float(row["sd_mm"]))
+            of.append(number)
+    functionals = np.zeros((len(rows), len(points), 3))
+    for k, (ends, direction) in enumerate(rows):
+        for end, share in zip(ends, (1.0, -1.0), strict=True):
+            for i in end:
+                functionals[k, i] += share * direction / len(end)
+    return np.array(points), functionals, np.array(deviations), np.array(of)
