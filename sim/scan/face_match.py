@@ -34,8 +34,8 @@ def face_template(head: Head) -> np.ndarray:
 def best_turns(points: np.ndarray, template: np.ndarray, turns: list[np.ndarray]) -> list[tuple[float, np.ndarray]]:
     """(misfit in mm, turn) of the best placement of the face near each of ``turns``, best first.
 
-    points (n, 3) mm : the scan in its own axes; template (k, 3) mm : +Z up, face toward -Y; turns : (3, 3) rotations
-    from the scan's axes to the template's. The misfit is the trimmed mean distance, measured on a head of reference size.
+    points (n, 3) mm : the scan in its own axes; template (k, 3) mm : +Z up, face toward -Y; turns : rotations (3, 3)
+    from the scan's axes to the template's. The misfit is the trimmed mean distance, on a head of reference size.
     """
     tree = cKDTree(points)
     few = template[_order(template, FEW)]

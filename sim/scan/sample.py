@@ -182,7 +182,7 @@ def _with_eyes(person, surface, paint, complexion):
     response.append(paint.response)
     gloss.append(paint.gloss)
     # sclera, iris, pupil: colour, response, gloss
-    looks = (((0.83, 0.79, 0.76), 0.75, 1.0), (complexion.iris, 0.5, 0.7), ((0.01, 0.01, 0.01), 0.1, 0.7))
+    looks = (((0.83, 0.79, 0.76), 0.8, 0.8), (complexion.iris, 2.2, 0.6), ((0.01, 0.01, 0.01), 5.0, 0.6))
     for part in ("eye_l", "eye_r"):
         mesh = person.parts[part]
         for number, (colour, back, shine) in enumerate(looks):

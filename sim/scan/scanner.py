@@ -43,7 +43,7 @@ class VirtualScanner:
     target: tuple[float, float, float] = (0.0, -60.0, -20.0)
     distance: float = 650.0
     field: tuple[float, float] = (300.0, 360.0)
-    pixel: float = 0.95
+    pixel: float = 1.12
     baseline: float = 13.0
     noise: float = 0.07
     ripple: float = 0.035
@@ -54,7 +54,7 @@ class VirtualScanner:
     steepest: float = 77.0
     tear: float = 3.6
     overlap: float | None = 5.0
-    specks: float = 5.0
+    specks: float = 4.0
 
     def scan(self, surface: Mesh, rng: np.random.Generator, response=None, gloss=None) -> Work:
         """The raw scan of ``surface`` (mm, +Z up, face toward -Y), a Mesh of triangles with colours.

@@ -15,7 +15,7 @@ from .noise import Noise
 #: Linear sRGB albedo of the bare skin (estimates for skin types II to V), hair (linear), iris (linear).
 TONES = ((0.60, 0.40, 0.30), (0.52, 0.33, 0.23), (0.40, 0.24, 0.15), (0.24, 0.13, 0.08))
 HAIR = ((0.030, 0.017, 0.010), (0.010, 0.007, 0.005), (0.10, 0.055, 0.025), (0.05, 0.02, 0.009))
-IRIS = ((0.07, 0.035, 0.015), (0.10, 0.16, 0.22), (0.09, 0.11, 0.05), (0.035, 0.018, 0.009))
+IRIS = ((0.07, 0.035, 0.015), (0.10, 0.15, 0.19), (0.085, 0.085, 0.045), (0.035, 0.018, 0.009))
 
 #: Absorption per channel of melanin and of blood, relative.
 MELANIN = np.array([0.40, 0.75, 1.15])
@@ -58,17 +58,17 @@ def paint_skin(points, normals, landmarks, inner, complexion: Complexion, rng: n
     """
     at = _Places(points, landmarks)
     melanin, blood = _uneven(points, rng)
-    blood += 0.50 * at.blob(("or", "ac", "zy"), 20) + 0.30 * at.near("prn", 13) + 0.22 * at.blob(("al", "ac"), 8)
-    blood += 0.35 * at.ears() + 0.12 * at.near("pg", 13) + 0.10 * at.near("g", 16)
+    blood += 0.30 * at.blob(("or", "ac", "zy"), 21) + 0.22 * at.near("prn", 13) + 0.16 * at.blob(("al", "ac"), 8)
+    blood += 0.20 * at.ears() + 0.10 * at.near("pg", 13) + 0.08 * at.near("g", 16)
     lids = at.blob(("ps", "pi", "os"), 9.5)
-    blood += 0.22 * lids
-    melanin += 0.22 * lids + 0.16 * at.blob(("pi", "or", "en"), 9) + 0.10 * at.blob(("en",), 6)
-    melanin += 0.10 * at.blob(("ac", "ch"), 9) + 0.5 * _freckles(points, at, complexion.freckles, rng)
+    blood += 0.14 * lids
+    melanin += 0.10 * lids + 0.10 * at.blob(("pi", "or", "en"), 9) + 0.08 * at.blob(("en",), 6)
+    melanin += 0.05 * at.blob(("ac", "ch"), 9) + 0.5 * _freckles(points, at, complexion.freckles, rng)
     melanin += 0.10 * np.clip((at.z - at.of("gn")[2] - 8) / -25, 0, 1)  # the throat
 
     lips = _lips(at)
-    blood += lips * (1.05 + 0.12 * Noise(rng, 2.0)(points * [1.6, 1, 0.35]))
-    melanin += 0.25 * lips
+    blood += lips * (0.72 + 0.12 * Noise(rng, 2.0)(points * [1.6, 1, 0.35]))
+    melanin += 0.16 * lips
     seam = np.exp(-(((at.z - at.mouth_line()) / 0.9) ** 2)) * at.mouth_width(0.98) * at.front()
     blood += 0.9 * seam
     melanin += 0.5 * seam + 1.2 * inner
@@ -82,9 +82,9 @@ def paint_skin(points, normals, landmarks, inner, complexion: Complexion, rng: n
     scalp = _scalp(at) * (1 + 0.15 * fine(points))
     beard = complexion.beard * _beard(at, lips) * (1 + 0.25 * fine(points))
     hair = np.asarray(complexion.hair)
-    for cover in (0.50 * np.clip(scalp, 0, 1), 0.40 * np.clip(beard, 0, 1), 0.92 * np.clip(brows, 0, 1), 0.8 * lashes):
+    for cover in (0.42 * np.clip(scalp, 0, 1), 0.40 * np.clip(beard, 0, 1), 0.92 * np.clip(brows, 0, 1), 0.8 * lashes):
         light = light * (1 - cover[:, None]) + hair * cover[:, None]
-    response = (1 - 0.55 * np.clip(scalp, 0, 1)) * (1 - 0.3 * np.clip(brows, 0, 1)) * (1 - 0.5 * lashes)
+    response = (1 - 0.25 * np.clip(scalp, 0, 1)) * (1 - 0.15 * np.clip(brows, 0, 1)) * (1 - 0.3 * lashes)
     gloss = 0.25 + 0.45 * at.near("prn", 12) + 0.3 * at.near("g", 24) + 0.4 * lips
     return Paint(to_srgb(np.clip(light, 0, 1)).astype(np.float32), response * (1 - 0.7 * inner), gloss)
 
@@ -145,8 +145,8 @@ class _Places:
 def _uneven(points, rng):
     """Blotches of pigment and blood: (n,) each."""
     broad, patchy, small = Noise(rng, 28.0)(points), Noise(rng, 9.0)(points), Noise(rng, 2.6)(points)
-    melanin = 0.04 * broad + 0.045 * patchy + 0.05 * small
-    blood = 0.06 * Noise(rng, 24.0)(points) + 0.07 * Noise(rng, 7.0)(points) + 0.05 * Noise(rng, 2.2)(points)
+    melanin = 0.025 * broad + 0.018 * patchy + 0.030 * small
+    blood = 0.04 * Noise(rng, 24.0)(points) + 0.035 * Noise(rng, 7.0)(points) + 0.04 * Noise(rng, 2.2)(points)
     return melanin, blood
 
 
@@ -196,17 +196,17 @@ def _brows(at, points, rng):
     # a parabola through the inner end, the top and the tail
     rise, fall = np.clip(t / top, 0, 1), np.clip((t - top) / (1 - top), 0, 1)
     middle = np.where(t < top, low + (height - low) * (2 * rise - rise**2), height + (tail - height) * fall**1.7)
-    thick = 3.6 * np.clip(1 - np.clip(t - 0.45, 0, None) / 0.62, 0.12, 1) * np.clip(0.75 + 2 * t, 0.75, 1)
+    thick = 4.0 * np.clip(1 - np.clip(t - 0.45, 0, None) / 0.62, 0.12, 1) * np.clip(0.75 + 2 * t, 0.75, 1)
     inside = thick - np.abs(at.z - middle)
     ragged = Noise(rng, 1.7)
-    sign = np.where(at.left, 1.0, -1.0)
-    lean = np.radians(62 - 50 * np.clip(t, 0, 1))  # upright near the nose, flat at the tail
-    along = sign * at.x * np.cos(lean) + at.z * np.sin(lean)
-    beside = -sign * at.x * np.sin(lean) + at.z * np.cos(lean)
-    strokes = Noise(rng, 1.0)(np.column_stack([along / 4.5, beside / 0.95, sign * 7.0 + points[:, 1] / 9]))
+    # strokes: upright near the nose, flat at the tail, always pointing outward
+    lean = np.clip(np.radians(66 - 48 * np.clip(t, 0, 1)), 0.2, 1.5)
+    above = at.z - middle
+    beside = (x - above / np.tan(lean)) * np.sin(lean)
+    strokes = Noise(rng, 1.0)(np.column_stack([beside / 0.85, above / 4.0, np.where(at.left, 5.0, 17.0)]))
     cover = _soft(inside + 0.9 * ragged(points), 3.2) * _soft((t + 0.02) * 30, 4) * _soft((1.03 - t) * 30, 5)
     front = at.y < np.maximum(ex[:, 1], sci[:, 1]) + 12
-    return cover * np.clip(0.62 + 0.36 * strokes, 0.1, 1) * front
+    return cover * np.clip(0.72 + 0.34 * strokes, 0.15, 1) * front
 
 
 def _lashes(at, landmarks):
