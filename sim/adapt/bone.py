@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Bone under fitted skin: moved by tissue-depth vectors, then kept inside (Kähler et al. 2002, section 5.2, item 2)."""
+
+import numpy as np
+from scipy.sparse import csr_matrix, diags, identity
+
+from ..anatomy.inside import winding_number
+from ..anatomy.tissue_depth import skull_targets
+from ..mesh import Mesh
+from .closest import Surface
+from .smooth_system import factorised, laplacian
+from .thin_plate_spline import ThinPlateSpline
+
+THIN, THICK = (
+    1.0,
+    2.0,
+)  # mm of tissue that always remain over bone, where the reference has little and where it has more
+INSIDE_MOUTH = 0.3  # mm, toward the closed cups behind lips, lids and nostrils
+NEAR = 12.0  # mm: bone deeper than this needs no test
+
+
+def depth_under(points, skin: Surface, reach: float = np.inf):
+    """How deep ``points`` (k, 3) lie under the skin, mm, negative outside; and the `Contacts` found.
+
+    Points out of reach are as deep as ``reach``. Inside and outside by the winding number, so the closed cups behind
+    lips and lids count as outside.
+    """
+    found = skin.closest(points, reach)
+    depth = np.where(found.found, found.distance, reach)
+    near = np.flatnonzero(found.found)
+    inner = winding_number(points[near], skin.vertices, skin.triangles) > 0.5
+    depth[near[~inner]] *= -1
+    return depth, found
+
+
+def follow_skin(vertices, skull_marks, landmarks, vectors, smoothing: float = 2.0):
+    """The warp from the bone's current landmarks to those the tissue vectors ask for (5.2, item 2).
+
+    vertices (n, 3) mm; skull_marks, landmarks, vectors : names -> (3,) mm, the bone's landmarks as they are, the
+    fitted skin's, and the vectors from bone to skin. Returns (n, 3) mm.
+    """
+    wanted = skull_targets(landmarks, vectors)
+    names = [n for n in wanted if n in skull_marks]
+    if len(names) < 4:
+        return np.array(vertices)
+    source = np.array([skull_marks[n] for n in names])
+    target = np.array([wanted[n] for n in names])
+    return ThinPlateSpline.fit(source, target, smoothing).transform(vertices)
+
+
+def least_depth(reference_depth, inner) -> np.ndarray:
+    """(k,) mm of tissue that must remain over bone vertices.
+
+    reference_depth (k,) mm over the same vertices of the reference head; inner (k,) bool: the nearest skin there is a
+    cup behind lips, lids or nostrils. Never more than the reference itself has.
+    """
+    wanted = np.clip(0.5 * reference_depth, THIN, THICK)
+    wanted = np.where(inner, INSIDE_MOUTH, wanted)
+    return np.where(reference_depth > 0, np.minimum(wanted, np.maximum(0.95 * reference_depth, 0.3)), 0.3)
+
+
+def keep_inside(bone: Mesh, skin: Surface, least, rounds: int = 12) -> np.ndarray:
+    """Bone vertices (n, 3) moved smoothly until each lies ``least`` (n,) mm or deeper under the skin."""
+    start = bone.vertices
+    bend = laplacian(start, bone.faces)
+    n = len(start)
+    smooth = (bend.T @ bend + 0.002 * identity(n)).tocsr()
+    moved = start.copy()
+    pulled = np.zeros(n, dtype=bool)
+    goal = np.zeros((n, 3))
+    for turn in range(rounds):
+        depth, found = depth_under(moved, skin, NEAR)
+        lack = least - depth
+        bad = found.found & (lack > 1e-3)
+        if not bad.any():
+            return moved
+        way = np.where(found.found[:, None], found.points - moved, 0)
+        way *= np.where(depth < 0, 1.0, -1.0)[:, None]
+        length = np.linalg.norm(way, axis=1, keepdims=True)
+        # On the skin itself, or where the way is unsure (edges), the skin's own normal tells.
+        way = np.where(length > 0.05, way / np.maximum(length, 1e-9), -found.normals)
+        goal[bad] = (moved - start + (lack[:, None] + 0.05) * way)[bad]
+        pulled |= bad
+        if turn < rounds - 4:
+            weight = diags(np.where(pulled, 3.0, 0.0))
+            shift = factorised((smooth + weight).tocsc())((csr_matrix(weight) @ goal))
+            moved = start + shift
+        else:  # what smoothness will not give, is given without
+            moved = np.where(bad[:, None], moved + (lack[:, None] + 0.05) * way, moved)
+    return moved

@@ -1,0 +1,155 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The last stage: the skin's own vertices move onto the data, held together by a smooth displacement.
+
+After the warps the skin lies near the scan wherever there are landmarks; here it reaches the limit of its own mesh.
+Each round pairs points of the skin with places on the scan that face the same way, throws out open sides, specks and
+outliers, and solves for the displacement that is closest to the data across the surface and smoothest elsewhere
+(bending energy, the discrete bi-Laplacian), more softly in each round.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import csr_matrix, diags, vstack
+
+from ..mesh import vertex_normals
+from .closest import Surface
+from .smooth_system import laplacian, solve_displacement
+
+#: One round each: stiffness of bending, reach in mm, width in mm of what counts as an outlier.
+SCHEDULE = (
+    (4.0, 12.0, 4.0),
+    (1.5, 10.0, 3.0),
+    (0.6, 8.0, 2.5),
+    (0.25, 6.0, 2.0),
+    (0.1, 5.0, 1.5),
+    (0.05, 4.0, 1.2),
+    (0.03, 4.0, 1.0),
+    (0.02, 4.0, 1.0),
+)
+ALONG = 0.02  # weight of a pull along the surface against one across it
+AGREE = 0.6  # cosine between the normals of skin and scan
+WHOLE = 150.0  # mm²: a piece of data smaller than this is trusted in proportion
+STRETCH = 0.002  # weight of first differences, which keeps the mesh from sliding where bending is free
+
+
+@dataclass(frozen=True, eq=False)
+class Anchors:
+    """Landmarks on the skin and where they belong.
+
+    sampling (k, n) sparse rows that give the landmark from the vertices; target (k, 3) mm; weight (k,).
+    """
+
+    sampling: csr_matrix
+    target: np.ndarray
+    weight: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """vertices (n, 3) mm; fitted (n,) 0..1, how far data decided the place; distance (n,) mm to the scan, signed
+    (positive outside) and NaN where there is none."""
+
+    vertices: np.ndarray
+    fitted: np.ndarray
+    distance: np.ndarray
+
+
+def matches(points, normals, target: Surface, reach: float):
+    """Where on the scan ``points`` (k, 3) of the skin belong, and how far to trust it.
+
+    Returns the `Contacts` and trust (k,) 0..1.
+    """
+    found = target.ranked(points, normals, reach, AGREE, near=32)
+    agree = np.einsum("ij,ij->i", found.normals, normals)
+    trust = np.where(found.found & ~found.border, np.clip((agree - AGREE) / (1 - AGREE) * 1.5, 0.05, 1), 0)
+    trust *= np.clip(target.piece_area[np.maximum(found.triangle, 0)] / WHOLE, 0, 1)
+    return found, trust
+
+
+def fine_fit(vertices, faces, triangles, free, target: Surface, anchors: Anchors, stiffness=None, rounds=SCHEDULE):
+    """A generator: yields the fraction done, returns `Fitted`.
+
+    Parameters
+    ----------
+    vertices (n, 3) mm : the warped skin
+    faces (m, 4) : its quads; triangles (t, 3) : the same as triangles
+    free (n,) bool : vertices that look for data; the others (mouth bag, lid backs, nostrils) follow smoothly
+    stiffness (n,) : factor on the bending stiffness of each vertex (1 everywhere by default)
+    """
+    base = np.array(vertices, dtype=float)
+    n = len(base)
+    stiffness = np.ones(n) if stiffness is None else np.array(stiffness, dtype=float)
+    bend = laplacian(base, faces)
+    look = sample_rows(faces, free, n)
+    displacement = np.zeros((n, 3))
+    outer = triangles[free[triangles].all(axis=1)]
+    trust = np.zeros(look.shape[0])
+    for turn, (soft, reach, width) in enumerate(rounds):
+        now = base + displacement
+        normal = vertex_normals(now, outer)
+        points = look @ now
+        across = look @ normal
+        across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-12)
+        found, trust = matches(points, across, target, reach)
+        use = np.flatnonzero(trust > 0)
+        gap = found.points[use] - points[use]
+        # The direction of the data's normal decides; a pinch of the skin's own keeps it calm on rough data.
+        facing = found.normals[use] + 0.5 * across[use]
+        facing /= np.linalg.norm(facing, axis=1, keepdims=True)
+        height = np.einsum("ij,ij->i", gap, facing)
+        robust = trust[use] / (1 + (height / width) ** 2) ** 2
+        blocks = robust[:, None, None] * (facing[:, :, None] * facing[:, None, :] + ALONG * np.eye(3))
+        goal = look[use] @ displacement + gap
+        hold = np.repeat(anchors.weight[:, None, None] * np.eye(3)[None], 1, axis=0)
+        want = anchors.target - anchors.sampling @ base
+        sampling = vstack([look[use], anchors.sampling]).tocsr()
+        blocks = np.concatenate([blocks, hold])
+        goal = np.concatenate([goal, want])
+        pulls = np.einsum("kij,kj->ki", blocks, goal)
+        smooth = (bend.T @ diags(soft * stiffness) @ bend + STRETCH * stretch(bend, stiffness)).tocsr()
+        displacement = solve_displacement(smooth, sampling, blocks, pulls, displacement)
+        worse = folded(base, base + displacement, triangles)
+        if worse.any():  # hold the surroundings of a fold more stiffly from now on
+            near = np.zeros(n)
+            near[triangles[worse].ravel()] = 1
+            for _ in range(2):
+                near = np.maximum(near, (np.abs(bend) @ near > 0) * 0.9)
+            stiffness = stiffness * np.where(near > 0, 6.0, 1.0)
+        yield (turn + 1) / len(rounds)
+    vertices = base + displacement
+    normal = vertex_normals(vertices, outer)
+    found, trust = matches(vertices, normal, target, 3.0)
+    trust[~free] = 0
+    gap = np.einsum("ij,ij->i", vertices - found.points, found.normals)
+    return Fitted(vertices, np.clip(trust, 0, 1), np.where(free & (trust > 0), gap, np.nan))
+
+
+def stretch(bend, stiffness):
+    """Energy (n, n) of first differences, symmetric, from the Laplacian's own neighbours."""
+    link = -(bend - diags(bend.diagonal()))
+    link = link.maximum(link.T)
+    total = np.asarray(link.sum(axis=1)).ravel()
+    return diags(total) - link
+
+
+def sample_rows(faces, free, n) -> csr_matrix:
+    """Sparse rows (s, n): the free vertices themselves and the middles of the diagonals their quads are split along."""
+    quad = faces[(faces[:, 3] >= 0)] if faces.shape[1] == 4 else faces[:0]
+    quad = quad[free[quad].all(axis=1)] if len(quad) else quad
+    own = np.flatnonzero(free)
+    rows = np.concatenate([np.arange(len(own)), np.repeat(len(own) + np.arange(len(quad)), 2)])
+    columns = np.concatenate([own, quad[:, [0, 2]].ravel()])
+    values = np.concatenate([np.ones(len(own)), np.full(2 * len(quad), 0.5)])
+    return csr_matrix((values, (rows, columns)), shape=(len(own) + len(quad), n))
+
+
+def folded(before, after, triangles, limit: float = 0.0):
+    """Which triangles (t,) turned over: their normal against what it was is below ``limit`` (cosine)."""
+
+    def unit(points):
+        a, b, c = (points[triangles[:, k]] for k in range(3))
+        normal = np.cross(b - a, c - a)
+        return normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+
+    return np.einsum("ij,ij->i", unit(before), unit(after)) < limit

@@ -1,0 +1,132 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The skin of the reference fitted to a scan: warp, refine, reach the data (Kähler et al. 2002, section 6)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import csr_matrix
+
+from ..anatomy.head import Head, SurfacePoints
+from ..anatomy.landmark_names import SKIN
+from ..mesh import vertex_normals
+from ..progress import Progress, Work
+from .closest import Surface
+from .completion import complete_positions, sigma
+from .fine_fit import Anchors, Fitted, fine_fit
+from .refine import Pairs, refine
+from .thin_plate_spline import ThinPlateSpline, WarpChain
+
+EAR_MARKS = ("sa", "sba", "pra", "pa", "obs", "obi", "t")
+CARRIED = 12.0  # mm a landmark that was not given may give way
+PICKED = 0.25  # share of a landmark's uncertainty that it may give way
+HOLD = 0.15  # weight in the last stage of a landmark picked to 1 mm, against 1 for a point of data
+
+
+@dataclass(frozen=True, eq=False)
+class SkinFit:
+    """What `fit_skin` returns.
+
+    chain : the warps of space that were applied, reference -> scan
+    fitted : the skin after the last stage
+    landmarks : name -> (3,) mm, given and completed targets
+    outer (t, 3) : triangles a scanner can see; target : the scan as used (turned if it was inside out)
+    """
+
+    chain: WarpChain
+    fitted: Fitted
+    landmarks: dict[str, np.ndarray]
+    outer: np.ndarray
+    target: Surface
+
+
+def group(head: Head, name: str) -> np.ndarray:
+    """(n,) weights of a skin group; zeros where the head has none of that name."""
+    found = head.groups.get(name)
+    return np.zeros(len(head.skin.vertices)) if found is None else np.asarray(found, dtype=float)
+
+
+def landmark_rows(points: SurfacePoints, names, n: int) -> csr_matrix:
+    """(k, n) sparse rows that give the named skin landmarks from the skin's vertices."""
+    at = [points.names.index(name) for name in names]
+    rows = np.repeat(np.arange(len(at)), 3)
+    return csr_matrix((points.weights[at].ravel(), (rows, points.corners[at].ravel())), shape=(len(at), n))
+
+
+def seen_ears(given) -> dict[str, bool]:
+    """Side -> whether that ear is in the scan, told by its landmarks: two or more of its own."""
+    return {side: sum(f"{m}_{side}" in given for m in EAR_MARKS) >= 2 for side in ("l", "r")}
+
+
+def fit_skin(reference: Head, target: Surface, given: dict[str, np.ndarray]) -> Work:
+    """Work returning the `SkinFit` of ``reference`` to the scan ``target`` with the landmarks ``given`` (mm)."""
+    skin = reference.skin
+    n = len(skin.vertices)
+    triangles = skin.triangles
+    inner = group(reference, "inner") > 0.5
+    outer = triangles[~inner[triangles].any(axis=1)]
+    names = [name for name in SKIN if name in reference.landmarks.names]
+    rows = landmark_rows(reference.landmarks, names, n)
+    marks = rows @ skin.vertices
+    landmarks = complete_positions(dict(zip(names, marks, strict=True)), given)
+    goal = np.array([landmarks[name] for name in names])
+    give = np.array([PICKED * sigma(name) if name in given else CARRIED for name in names])
+
+    yield Progress(0.0, "Warp to the landmarks")
+    first = ThinPlateSpline.fit(marks, goal, give)
+    chain = WarpChain((first,))
+    moved = first.transform(skin.vertices)
+    target = facing_out(target, moved, outer)
+    # Landmarks that were not given are where the skin is now; data will move them.
+    known = np.array([name in given for name in names])
+    now = rows @ moved
+    pairs = Pairs(now, np.where(known[:, None], goal, now), give)
+    work = refine(moved, outer, target, feature_triangles(reference, names), pairs)
+    warps = None
+    while warps is None:
+        try:
+            done, _ = next(work)
+            yield Progress(0.05 + 0.35 * done, "Refine the landmarks")
+        except StopIteration as stop:
+            warps = stop.value
+    for warp in warps:
+        chain = chain.then(warp)
+        moved = warp.transform(moved)
+
+    free, stiffness = freedom(reference, given)
+    weight = np.array([HOLD / sigma(name) ** 2 if name in given else 0.0 for name in names])
+    work = fine_fit(moved, skin.faces, triangles, free, target, Anchors(rows, goal, weight), stiffness)
+    fitted = None
+    while fitted is None:
+        try:
+            yield Progress(0.4 + 0.6 * next(work), "Reach the scan")
+        except StopIteration as stop:
+            fitted = stop.value
+    return SkinFit(chain, fitted, landmarks, outer, target)
+
+
+def feature_triangles(reference: Head, names) -> np.ndarray:
+    """The reference's feature mesh (f, 3) with indices into ``names``."""
+    place = {name: k for k, name in enumerate(names)}
+    order = np.array([place.get(name, -1) for name in reference.landmarks.names], dtype=np.int32)
+    return order[reference.feature_mesh]
+
+
+def facing_out(target: Surface, skin: np.ndarray, outer: np.ndarray) -> Surface:
+    """``target``, turned if most of it faces the other way than the skin beside it (scans wound inside out)."""
+    used = np.unique(outer)
+    found = target.closest(skin[used], 20.0)
+    agree = np.einsum("ij,ij->i", found.normals, vertex_normals(skin, outer)[used])[found.found]
+    return target.turned() if len(agree) and np.median(agree) < -0.2 else target
+
+
+def freedom(reference: Head, given):
+    """Which skin vertices look for data (n,) bool, and how stiff each is (n,)."""
+    inner = group(reference, "inner") > 0.5
+    free = ~inner
+    stiffness = 1 + 3.0 * inner + 2.0 * group(reference, "neck") + 1.0 * group(reference, "scalp")
+    for side, seen in seen_ears(given).items():
+        ear = group(reference, f"ear_{side}")
+        stiffness += (4.0 if seen else 60.0) * ear
+        if not seen:  # hair lies where the ear would be
+            free &= ear < 0.5
+    return free, stiffness
