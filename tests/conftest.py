@@ -96,3 +96,11 @@ def bad_scan(tmp_path):
         return path
 
     return make
+
+
+@pytest.fixture(scope="session")
+def reference_model(reference):
+    """The reference head's tissue, built once; solving does not change it."""
+    from headshop.sim.tissue.model import build_model
+
+    return build_model(reference)

@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Engine-ready copies: exact names, no modifiers, the scene untouched; plain files that say what the head is."""
+
+import json
+
+import numpy as np
+import pytest
+from headshop.sim.adapt.landmarks import read_landmarks
+from headshop.sim.scan.ply import read_ply
+
+SHAPES = ("joy", "mouthSmileLeft")
+
+
+@pytest.fixture
+def skin(bpy, reference):
+    """A head with two baked shapes, one of the artist's own, and the live pose."""
+    from headshop.headshop_addon import bridge, heads, shape_keys
+
+    heads.create_head(reference, "Fran")
+    skin = heads.find_heads()[0]
+    rng = np.random.default_rng(3)
+    shapes = {
+        name: {part: rng.normal(size=reference.parts[part].vertices.shape) for part in ("skin", "tongue")}
+        for name in SHAPES
+    }
+    shape_keys.write_shapes(skin, shapes, {name: {"peak_mm": 1.0} for name in SHAPES})
+    bridge.ensure_shape_key(skin, "sculpted")
+    bridge.ensure_shape_key(skin, "Live")
+    heads.write_report(skin, {"fit": {"mean_mm": 0.1}, "landmarks_missing": ["v"]})
+    return skin
+
+
+def everything(bpy):
+    blocks = [*bpy.data.objects, *bpy.data.meshes, *bpy.data.scenes, *bpy.data.shape_keys, *bpy.data.actions]
+    return sorted((block.id_type, block.name) for block in blocks)
+
+
+@pytest.mark.parametrize("extension", ["glb", "fbx", "usdc"])
+def test_an_engine_gets_exact_names_and_no_modifiers(bpy, skin, tmp_path, extension, reference):
+    from headshop.headshop_addon.export import PARTS, export_head
+
+    before = everything(bpy)
+    path = tmp_path / f"fran.{extension}"
+    assert export_head(skin, path) == [*SHAPES, "sculpted"]
+    assert everything(bpy) == before and [p.name for p in tmp_path.iterdir()] == [path.name]
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    reader = {
+        "glb": lambda: bpy.ops.import_scene.gltf(filepath=str(path)),
+        "fbx": lambda: bpy.ops.wm.fbx_import(filepath=str(path)),
+        "usdc": lambda: bpy.ops.wm.usd_import(filepath=str(path)),
+    }
+    reader[extension]()
+    found = {
+        o.name.replace("_", " ").removesuffix(".001"): o
+        for o in bpy.data.objects
+        if o.type == "MESH" and len(o.data.polygons)
+    }
+    assert len(found) == len(PARTS)
+    copy, tongue = found["Fran Skin"], found["Fran Tongue"]
+    assert copy.data.shape_keys.key_blocks.keys()[1:] == [*SHAPES, "sculpted"]
+    assert tongue.data.shape_keys.key_blocks.keys()[1:] == list(SHAPES)
+    assert len(copy.data.polygons) in (len(reference.skin.faces), len(reference.skin.triangles))
+    bpy.context.view_layer.update()
+    box = np.array([copy.matrix_world @ v.co for v in copy.data.vertices]) * 1000
+    np.testing.assert_allclose(box.min(axis=0), reference.skin.vertices.min(axis=0), atol=0.01)
+
+
+def test_plain_files(bpy, skin, tmp_path, reference):
+    from headshop.headshop_addon.plain_export import write_plain
+    from headshop.headshop_addon.plain_files import FILES
+
+    write_plain(skin, tmp_path)
+    assert sorted(p.name for p in tmp_path.iterdir()) == sorted(FILES)
+    for part in ("skin", "skull", "mandible"):
+        mesh = read_ply(tmp_path / f"{part}.ply")
+        np.testing.assert_allclose(mesh.vertices, reference.parts[part].vertices, atol=1e-3)
+        np.testing.assert_array_equal(mesh.triangles, reference.parts[part].triangles)
+    landmarks = read_landmarks(tmp_path / "landmarks.json")
+    assert len(landmarks) == 59 and "v" not in landmarks
+    bony = json.loads((tmp_path / "skull_landmarks.json").read_text())["landmarks"]
+    assert len(bony) == 22
+    np.testing.assert_allclose(bony["rhi"], reference.skull_landmark_positions()["rhi"], atol=1e-3)
+    muscles = json.loads((tmp_path / "muscles.json").read_text())
+    assert muscles.keys() == {muscle.name for muscle in reference.muscles}
+    assert muscles["zygomaticus_major_l"].keys() == {"type", "origin", "points", "width"}
+    assert json.loads((tmp_path / "report.json").read_text())["fit"] == {"mean_mm": 0.1}
+    with np.load(tmp_path / "shapes.npz") as shapes:
+        assert shapes["names"].tolist() == list(SHAPES)
+        assert shapes["deltas"].shape == (2, *reference.skin.vertices.shape)
+        np.testing.assert_allclose(shapes["basis"], reference.skin.vertices, atol=1e-3)
+        assert np.abs(shapes["deltas"]).max() > 1 and shapes["triangles"].max() < len(shapes["basis"])
+
+
+def test_no_shapes_file_before_a_bake(bpy, reference, tmp_path):
+    from headshop.headshop_addon import heads
+    from headshop.headshop_addon.plain_export import write_plain
+
+    heads.create_head(reference, "Fran")
+    write_plain(heads.find_heads()[0], tmp_path)
+    assert "shapes.npz" not in [p.name for p in tmp_path.iterdir()]
