@@ -6,7 +6,8 @@ import bpy
 from ..sim.acting import expressions
 from ..sim.errors import InputError
 from ..sim.progress import Work, portion
-from . import heads, performance, pipeline, shape_keys
+from . import heads, performance, shape_keys
+from .provenance import timed, versions
 
 SETS = ("expressions", "muscles")
 
@@ -37,17 +38,17 @@ def bake(skin: bpy.types.Object, pose_set: str | None = None, acted=None) -> Wor
     border = 1.0 if acted is None else 0.5
     shapes = acting = None
     if pose_set is not None:
-        with pipeline.timed(seconds, f"bake_{pose_set}"):
+        with timed(seconds, f"bake_{pose_set}"):
             shapes = yield from portion(shape_keys.bake_poses(skin, poses_of_set(skin, pose_set)), 0.0, border)
     if acted is not None:
-        with pipeline.timed(seconds, "bake_performance"):
+        with timed(seconds, "bake_performance"):
             acting = yield from portion(bake_acted(skin, acted), 0.0 if pose_set is None else border, 1.0)
     if shapes is not None:
         report["shapes"] = shape_keys.baked_report(skin)
     if acting is not None:
         report["performance"] = acting
     report["seconds"] = seconds
-    report["versions"] = pipeline.versions()
+    report["versions"] = versions()
     heads.write_report(skin, report)
     return report
 

@@ -18,7 +18,7 @@ _BLEND, _PICTURES, _ENGINES = (".blend",), (".png", ".mp4"), (".glb", ".fbx", ".
 def version() -> None:
     """Print the versions of what a head is made with."""
     _start_blender()
-    from .pipeline import versions
+    from .provenance import versions
 
     print("  ".join(f"{name} {number}" for name, number in versions().items()))
 

@@ -1,16 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """From a scan file and landmarks to a head in the scene: the one path that operators and the command line share."""
 
-import platform
-import time
-import tomllib
-from contextlib import contextmanager
 from dataclasses import dataclass, field
-from pathlib import Path
 
 import bpy
 import numpy as np
-import scipy
 
 from ..sim.adapt.build import build_head
 from ..sim.anatomy.storage import load_head
@@ -20,6 +14,7 @@ from ..sim.progress import Progress, Work, portion
 from ..sim.scan.clean import clean_scan
 from ..sim.scan.orientation import Orientation, detect
 from . import bridge, heads
+from .provenance import timed, versions
 from .scan_import import read_scan
 
 
@@ -35,33 +30,6 @@ class Scan:
     orientation: Orientation
     report: dict = field(default_factory=dict)
     seconds: dict = field(default_factory=dict)
-
-
-@contextmanager
-def timed(seconds: dict, stage: str):
-    """Add the seconds spent inside to ``seconds[stage]``."""
-    start = time.perf_counter()
-    try:
-        yield
-    finally:
-        seconds[stage] = round(seconds.get(stage, 0.0) + time.perf_counter() - start, 3)
-
-
-def versions() -> dict[str, str]:
-    """What made a head: versions of Head Shop, Blender, Python, numpy and scipy."""
-    return {
-        "headshop": own_version(),
-        "blender": bpy.app.version_string,
-        "python": platform.python_version(),
-        "numpy": np.__version__,
-        "scipy": scipy.__version__,
-    }
-
-
-def own_version() -> str:
-    """The version in the extension's manifest."""
-    manifest = Path(__file__).resolve().parents[1] / "blender_manifest.toml"
-    return tomllib.loads(manifest.read_text(encoding="utf-8"))["version"]
 
 
 def load_scan(path, landmarks: dict | None = None, unit: str | None = None, up: str | None = None) -> Scan:
