@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Dress a head: the attributes its materials read, and the materials themselves.
+
+Materials are found by name in the file, so a second head shares them and an artist's changes to them stay.
+"""
+
+import bpy
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..sim.anatomy.head import MATERIALS, Eye, Head, Muscle
+from ..sim.mesh import Mesh
+from . import heads
+from .anatomy_materials import FIBRE, REST, anatomy_material
+from .eye_materials import EYE, eye_material
+from .skin_material import skin_material
+from .skin_paint import paint_skin, write_vectors
+
+_EYE_KINDS = ("sclera", "iris", "pupil", "cornea")
+
+
+def dress_head(skin: bpy.types.Object) -> None:
+    """Give every part of a head its material, and the attributes that the materials read.
+
+    Calling it again refreshes the attributes and replaces empty slots only.
+
+    Raises
+    ------
+    InputError : not a whole head.
+    """
+    head = heads.read_head(skin)
+    axes = head_axes(head)
+    objects = heads.parts_of(skin)
+    for part, obj in objects.items():
+        mesh = head.parts[part]
+        place = mesh.vertices @ axes.T
+        if part == "skin":
+            paint_skin(obj, mesh, head.groups, place, {n: axes @ p for n, p in head.landmark_positions().items()})
+        elif part in ("eye_l", "eye_r"):
+            write_vectors(obj.data, EYE, eye_coordinates(mesh, head.eyes[part == "eye_r"], axes[2]))
+        else:
+            write_vectors(obj.data, REST, place)
+        _fill_slots(obj, [_material(kind) for kind in MATERIALS[part]])
+    muscles = heads.muscles_of(skin)
+    for muscle in head.muscles:
+        if muscle.name in muscles:
+            obj = muscles[muscle.name]
+            write_vectors(obj.data, FIBRE, fibre_coordinates(muscle))
+            _fill_slots(obj, [_material("muscle")])
+
+
+def head_axes(head: Head) -> np.ndarray:
+    """(3, 3) rows: the subject's left, back and up (Frankfurt horizontal) in the head's coordinates."""
+    at = head.landmark_positions()
+    left = at["t_l"] - at["t_r"]
+    left /= np.linalg.norm(left)
+    back = at["t_l"] + at["t_r"] - at["or_l"] - at["or_r"]
+    back -= left * (back @ left)
+    back /= np.linalg.norm(back)
+    return np.array([left, back, np.cross(left, back)])
+
+
+def _material(kind: str) -> bpy.types.Material:
+    if kind == "skin":
+        return skin_material()
+    return eye_material(kind) if kind in _EYE_KINDS else anatomy_material(kind)
+
+
+def _fill_slots(obj: bpy.types.Object, materials: list[bpy.types.Material]) -> None:
+    slots = obj.data.materials
+    for index, material in enumerate(materials):
+        if index >= len(slots):
+            slots.append(material)
+        elif slots[index] is None:
+            slots[index] = material
+
+
+def eye_coordinates(mesh: Mesh, eye: Eye, up: np.ndarray) -> np.ndarray:
+    """(n, 3): across the gaze in iris radii, to the left and up; and the pupil's radius in iris radii."""
+    gaze = eye.gaze / np.linalg.norm(eye.gaze)
+    side = np.cross(up, -gaze)
+    side /= np.linalg.norm(side)
+    offset = mesh.vertices - eye.centre
+    flat = np.column_stack([offset @ side, offset @ np.cross(-gaze, side)])
+    radius = np.linalg.norm(flat, axis=1)
+    # behind the eye's equator go on outwards, so that veins do not return to the middle of the gaze
+    reach = eye.radius
+    behind = np.maximum(-(offset @ gaze), 0.0)
+    flat *= ((radius + behind) / np.maximum(radius, 1e-9))[:, None]
+
+    def rim(kind: str, otherwise: float) -> float:
+        faces = mesh.faces[mesh.material == MATERIALS["eye_l"].index(kind)] if mesh.material is not None else []
+        return float(radius[faces[faces >= 0]].max()) if len(faces) else otherwise
+
+    iris = rim("iris", 0.48 * reach)
+    pupil = rim("pupil", 0.4 * iris)
+    return np.column_stack([flat / iris, np.full(len(flat), pupil / iris)])
+
+
+def fibre_coordinates(muscle: Muscle) -> np.ndarray:
+    """(n, 3) for each vertex of a muscle's shape: 0..1 along its fibres, then mm across the belly and in depth."""
+    fibres = muscle.fibres
+    if muscle.ring:
+        fibres = np.concatenate([fibres, fibres[:, :1]], axis=1)
+    steps = np.linalg.norm(np.diff(fibres, axis=1), axis=2)
+    length = np.concatenate([np.zeros((len(fibres), 1)), np.cumsum(steps, axis=1)], axis=1)
+    along = length / np.maximum(length[:, -1:], 1e-9)
+    # denser points than the fibres' own, so that the nearest one tells how far along we are
+    count = 60
+    wanted = np.linspace(0, 1, count)
+    dense = np.array([[np.interp(wanted, a, f[:, k]) for k in range(3)] for a, f in zip(along, fibres, strict=True)])
+    dense = dense.transpose(0, 2, 1)  # (fibres, count, 3)
+    _, nearest = cKDTree(dense.reshape(-1, 3)).query(muscle.shape.vertices)
+    where = wanted[nearest % count]
+    # the local frame of the sheet: along the fibre, across the fibres, through the belly
+    middle = dense.mean(axis=0)
+    tangent = np.gradient(middle, axis=0)
+    tangent /= np.maximum(np.linalg.norm(tangent, axis=1, keepdims=True), 1e-9)
+    spread = (dense[-1] - dense[0]) if len(dense) > 1 else np.broadcast_to(np.array([0.3, 0.2, 0.9]), middle.shape)
+    spread = spread - tangent * (spread * tangent).sum(1, keepdims=True)
+    spread /= np.maximum(np.linalg.norm(spread, axis=1, keepdims=True), 1e-9)
+    through = np.cross(tangent, spread)
+    step = nearest % count
+    offset = muscle.shape.vertices - middle[step]
+    if muscle.ring:
+        where = np.full(len(where), 0.5)  # a ring has no tendon
+    return np.column_stack([where, (offset * spread[step]).sum(1), (offset * through[step]).sum(1)])
