@@ -6,7 +6,7 @@ import pytest
 from headshop.sim.acting.pose import Pose, control
 from headshop.sim.anatomy.head import PARTS, SKIN_GROUPS, Eye, Head, Jaw, Muscle, SurfacePoints
 from headshop.sim.mesh import Mesh
-from headshop.sim.tissue import contact
+from headshop.sim.tissue import contact, planes
 from headshop.sim.tissue.energy import energy_gradient, find_contacts, pose_of
 from headshop.sim.tissue.model import build_model
 from headshop.sim.tissue.solver import rest_state, solve, step
@@ -140,9 +140,9 @@ def test_fascia_slides_on_bone_and_never_enters(model):
     node = n + np.argmin(np.abs(x[n : 2 * n, :2]).sum(axis=1))
     bone = contact.bone_planes(model.layers, x[2 * n :], np.eye(3), model.cache["matrix"]["margin"])
     x[node] += [2.0, 0, 0]
-    assert contact.depths(bone, x).max() == 0
+    assert planes.depths(bone, x).max() == 0
     x[node] += [0, 0, -6.0]
-    energy, gradient = contact.contact_energy(bone, x, 10.0)
+    energy, gradient = planes.contact_energy(bone, x, 10.0)
     assert energy > 0 and gradient[node, 2] < 0 and np.abs(gradient[node, :2]).max() < 1e-12
-    out = contact.project(bone, x)
-    assert contact.depths(bone, out).max() < 1e-9 and out[node, 0] == x[node, 0]
+    out = planes.project(bone, x)
+    assert planes.depths(bone, out).max() < 1e-9 and out[node, 0] == x[node, 0]

@@ -2,8 +2,8 @@
 """Muscle strength from the motion people show: at activation 1 the skin's peak moves by the table's millimetres.
 
 A head's own compliance is measured at build, by one linear solve per muscle with the solver's matrix. That matrix is
-stiffer than the tissue (it resists springs sideways, too), by a ratio that belongs to the muscle's place in the face and
-hardly to the head: the table's ``gain``, measured once on the reference head with full solves (`measured_gains`).
+stiffer than the tissue (it resists springs sideways, too), by a ratio that belongs to the muscle's place in the face
+and hardly to the head: the table's ``gain``, measured once on the reference head with full solves (`measured_gains`).
 """
 
 from dataclasses import replace

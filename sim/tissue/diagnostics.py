@@ -5,6 +5,7 @@ import numpy as np
 
 from . import contact
 from .lids import eyeball_radius
+from .planes import depths
 from .structures import Model
 from .volume import prism_volumes
 
@@ -27,8 +28,8 @@ def diagnose(model: Model, pose, positions, planes, energy, residual) -> dict:
         "residual": float(residual),
         "energy": float(energy),
         "volume_drift": float(volume.sum() / rest.sum() - 1),
-        "penetration_mm": float(max(contact.depths(planes, positions).max(initial=0.0), eye)),
-        "bone_penetration_mm": float(contact.depths(bone, positions).max(initial=0.0)),
+        "penetration_mm": float(max(depths(planes, positions).max(initial=0.0), eye)),
+        "bone_penetration_mm": float(depths(bone, positions).max(initial=0.0)),
         "inverted_prisms": int((volume <= 0).sum()),
         "peak_mm": float(moved.max(initial=0.0)),
     }

@@ -11,9 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
-from . import contact
+from . import arch, contact
 from .jaw import jaw_transform
 from .lids import lid_targets
+from .planes import Planes, contact_energy, joined
 from .springs import spring_energy
 from .structures import Control, Model
 from .volume import corner_gather, volume_energy
@@ -67,7 +68,7 @@ def pose_of(model: Model, control: Control) -> Pose:
         rest = model.layers.nodes[lids.column]
         lid_node.append(lids.column)
         lid_goal.append(rest + goal - lid_targets(lids, 0.0, 0.0, np.zeros(2)))
-        lid_stiffness.append(lids.weight**2)
+        lid_stiffness.append(lids.hold)
     none = np.zeros((0, 3))
     return Pose(
         reference=reference,
@@ -100,12 +101,12 @@ def system_matrix(model: Model) -> dict:
     layers, springs, p = model.layers, model.springs, model.parameters
     n = model.count
     laplacian = model.bending
-    bend = bending_stiffness(model) * (laplacian.T @ sparse.diags(1 / layers.area) @ laplacian)
+    bend = bending_stiffness(model) * (laplacian.T @ sparse.diags(layers.sheet / layers.area) @ laplacian)
     hold = np.concatenate([0.15 * layers.restoration, 0.85 * layers.restoration])
     quadratic = sparse.block_diag([0.7 * bend, 0.3 * bend], format="csr") + sparse.diags(hold)
     lid = np.zeros(2 * n)
     for lids in model.lids:
-        lid[lids.column] += p.lid * lids.weight**2
+        lid[lids.column] += p.lid * lids.hold
     stretch = springs.gather @ sparse.diags(springs.stiffness) @ springs.difference
     full = quadratic + stretch[: 2 * n, : 2 * n] + sparse.diags(lid)
     free = np.flatnonzero(layers.free)
@@ -118,7 +119,7 @@ def system_matrix(model: Model) -> dict:
     }
 
 
-def energy_gradient(model: Model, pose: Pose, planes: contact.Planes, positions) -> tuple[float, np.ndarray]:
+def energy_gradient(model: Model, pose: Pose, planes: Planes, positions) -> tuple[float, np.ndarray]:
     """Energy and its gradient over the free nodes (m, 3); ``positions`` (3 n, 3)."""
     fixed = model.cache["matrix"]
     n = model.count
@@ -128,7 +129,7 @@ def energy_gradient(model: Model, pose: Pose, planes: contact.Planes, positions)
         e, g = volume_energy(positions, model.prisms, model.prism_volume, model.parameters.volume, fixed["gather"])
         energy += e
         gradient += g
-    e, g = contact.contact_energy(planes, positions, model.parameters.contact * model.parameters.epidermis)
+    e, g = contact_energy(planes, positions, model.parameters.contact * model.parameters.epidermis)
     energy += e
     gradient += g
     # muscles: force push (1 - progress / reach), spent at reach; contraction is progress along the fibre's direction
@@ -150,14 +151,15 @@ def energy_gradient(model: Model, pose: Pose, planes: contact.Planes, positions)
     return energy, gradient[free] + restoring
 
 
-def find_contacts(model: Model, pose: Pose, positions) -> contact.Planes:
+def find_contacts(model: Model, pose: Pose, positions) -> Planes:
     """The planes that matter near ``positions`` (3 n, 3)."""
     n = model.count
     rest = model.layers.nodes[:n]
     bone = pose.reference[2 * n :]
-    return contact.joined(
+    return joined(
         contact.bone_planes(model.layers, bone, pose.rotation, model.cache["matrix"]["margin"]),
         *(contact.eye_planes(lids, positions[:n], pose.gaze) for lids in model.lids),
-        contact.teeth_contacts(model.contacts, positions[:n], rest, pose.rotation, pose.translation),
+        arch.arch_contacts(model.contacts, positions[:n], pose.rotation, pose.translation),
+        contact.sheet_contacts(model.contacts, positions[:n]),
         contact.lip_contacts(model.contacts, positions[:n], rest),
     )

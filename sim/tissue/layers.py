@@ -15,16 +15,17 @@ from .geometry import Surface, cotangent_stiffness, smoothed, vertex_areas
 from .parameters import Parameters
 from .structures import Layers
 
-#: Boneless places: depth in mm from skin to fascia, factor on the restoration, factor on the muscle-layer springs.
+#: Boneless places: depth in mm from skin to fascia, factor on the restoration, on the muscle-layer springs, on the
+#: sheet. Later rows win where groups overlap.
 _SOFT = {
-    "lid_upper": (0.9, 0.6, 0.3),
-    "lid_lower": (0.9, 0.6, 0.3),
-    "lip_upper": (2.2, 0.05, 0.05),
-    "lip_lower": (2.2, 0.05, 0.05),
-    "mouth_bag": (1.2, 0.10, 0.05),
-    "nostril": (1.2, 1.2, 0.6),
-    "ear": (1.5, 4.0, 1.0),
-    "neck": (4.0, 0.5, 0.5),
+    "mouth_bag": (1.2, 0.8, 0.3, 0.15),
+    "lip_upper": (2.2, 0.05, 0.05, 0.7),
+    "lip_lower": (2.2, 0.05, 0.05, 0.7),
+    "lid_upper": (0.9, 0.3, 0.2, 0.06),
+    "lid_lower": (0.9, 0.3, 0.2, 0.12),
+    "nostril": (1.2, 1.2, 0.6, 1.0),
+    "ear": (1.5, 4.0, 1.0, 1.0),
+    "neck": (4.0, 0.5, 0.5, 1.0),
 }
 #: Cheeks and all else without bone within reach.
 _CHEEK = (3.5, 0.2, 0.15)
@@ -62,11 +63,12 @@ def build_layers(head: Head, parameters: Parameters) -> Layers:
 
     soft = np.zeros(n)
     depth = np.full(n, _CHEEK[0])
-    hold, layer = np.full(n, _CHEEK[1]), np.full(n, _CHEEK[2])
-    for name, (d, h, m) in _SOFT.items():
+    hold, layer, sheet = np.full(n, _CHEEK[1]), np.full(n, _CHEEK[2]), np.ones(n)
+    for name, (d, h, m, e) in _SOFT.items():
         w = np.broadcast_to(_sides(groups, name), (n,))
         soft = np.maximum(soft, w)
-        depth, hold, layer = (x + w * (y - x) for x, y in ((depth, d), (hold, h), (layer, m)))
+        pairs = ((depth, d), (hold, h), (layer, m), (sheet, e))
+        depth, hold, layer, sheet = (x + w * (y - x) for x, y in pairs)
     inner = groups.get("inner", np.zeros(n))
     depth = np.where(inner > 0.5, np.minimum(depth, 1.2), depth)
     reach = (bone_distance < _REACH) & (bone_distance > 0.3) & (facing > 0.4) & (inner < 0.5)
@@ -99,6 +101,7 @@ def build_layers(head: Head, parameters: Parameters) -> Layers:
         bone_normal=bone_normal,
         restoration=restoration,
         soften=soften,
+        sheet=sheet,
         free=np.concatenate([movable, movable]),
     )
 

@@ -106,6 +106,7 @@ def build_lids(head: Head, layers: Layers, side: str) -> Lids | None:
         elevation=elevation,
         radius=radius,
         upper=upper,
+        hold=weight**2 * np.where(inner, 0.5, 1.0),
         opening=opening,
         contact_column=touching,
         clearance=clearance,

@@ -37,6 +37,7 @@ def build_model(head: Head, parameters: Parameters = DEFAULT, table: dict | None
     table = strengths() if table is None else table
     layers = build_layers(head, parameters)
     n = len(layers.area)
+    ties = sheet_ties(head, layers)
     triangles = head.skin.triangles
     prisms = np.concatenate([triangles, triangles + n], axis=1)
     # a prism pressed flat by a sharp fold of the skin has no volume to keep
@@ -48,13 +49,13 @@ def build_model(head: Head, parameters: Parameters = DEFAULT, table: dict | None
     model = Model(
         parameters=parameters,
         layers=layers,
-        springs=build_springs(head.skin.faces, layers, parameters, sheet_ties(head, layers)),
+        springs=build_springs(head.skin.faces, layers, parameters, ties),
         prisms=prisms[kept],
         prism_volume=volume[kept],
         bending=laplacian,
         muscles=build_muscle_field(head, layers, table),
         lids=tuple(x for x in (build_lids(head, layers, side) for side in "lr") if x is not None),
-        contacts=build_surfaces(head, layers),
+        contacts=build_surfaces(head, layers, ties),
         jaw=head.jaw,
         eyes=head.eyes,
         faces=head.skin.faces,

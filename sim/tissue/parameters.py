@@ -32,8 +32,8 @@ class Parameters:
     #: bending of the skin sheet, from the ratio of bending to stretching: the length (mm) under which it evens out.
     bending_length: float = 6.0
     #: contact penalties, in multiples of the epidermal stiffness.
-    contact: float = 4.0
-    lid: float = 60.0
+    contact: float = 10.0
+    lid: float = 1500.0
     #: grams per mm² of skin: 5 mm of tissue at about 1 g/cm³.
     mass_area: float = 0.005
     #: per second; near critical for the slowest modes.

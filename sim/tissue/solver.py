@@ -11,9 +11,9 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
-from . import contact
 from .diagnostics import diagnose
 from .energy import energy_gradient, find_contacts, pose_of
+from .planes import Planes, project
 from .structures import Control, Model, Solution, State
 
 _MEMORY = 10
@@ -56,7 +56,7 @@ def solve(
     )
     n = model.count
     visible = _skin_planes(find_contacts(model, pose, positions), n)
-    positions = contact.project(visible, positions)
+    positions = project(visible, positions)
     result = State(positions, np.zeros_like(positions))
     report = diagnose(model, pose, positions, visible, energy, residual)
     return Solution(result, residual <= tolerance, residual, iterations, report)
@@ -93,7 +93,7 @@ def _reference_of(model, bones):
 
 def _skin_planes(planes, n):
     keep = (planes.node < n) & (planes.partner < n)
-    return contact.Planes(planes.node[keep], planes.normal[keep], planes.level[keep], planes.partner[keep])
+    return Planes(planes.node[keep], planes.normal[keep], planes.level[keep], planes.partner[keep])
 
 
 def factorised(model: Model, dt: float | None = None):

@@ -39,14 +39,15 @@ def build_springs(faces: np.ndarray, layers: Layers, parameters: Parameters, tie
         groups.append((a, b, np.full(len(a), kind), c, c if c2 is None else c2, np.full(len(a), limit)))
 
     p = parameters
-    add(0, sheet[:, 0], sheet[:, 1], p.epidermis)
+    loose = np.sqrt(layers.sheet[sheet].prod(axis=1))
+    add(0, sheet[:, 0], sheet[:, 1], p.epidermis * loose)
     across = layers.area * scale
     limit = p.biphasic_strain
     add(1, column, column + n, p.dermal_fatty * across, p.dermal_fatty_stiff * across, limit)
     cross = share * scale
     for a, b in ((side[:, 0], side[:, 1]), (side[:, 1], side[:, 0])):
         add(2, a, b + n, p.dermal_fatty * cross, p.dermal_fatty_stiff * cross, limit)
-    add(3, sheet[:, 0] + n, sheet[:, 1] + n, p.fascia)
+    add(3, sheet[:, 0] + n, sheet[:, 1] + n, p.fascia * loose)
     add(4, column + n, column + 2 * n, p.muscle_layer * across * layers.soften)
     soft = layers.soften[side].mean(axis=1)
     for a, b in ((side[:, 0], side[:, 1]), (side[:, 1], side[:, 0])):

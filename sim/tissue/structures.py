@@ -22,6 +22,7 @@ class Layers:
     bone_normal : (n, 3) outward normal of the bone under the column
     restoration : stiffness of the nodal restoration force of 3.8
     soften : factor 0..1 on the muscle-layer springs (boneless places)
+    sheet : factor on stretching and bending of the skin (lid skin is thin and lies in folds)
     free : (2 n,) bool, epidermis and fascia nodes that the solver moves
     """
 
@@ -33,6 +34,7 @@ class Layers:
     bone_normal: np.ndarray
     restoration: np.ndarray
     soften: np.ndarray
+    sheet: np.ndarray
     free: np.ndarray
 
 
@@ -79,6 +81,7 @@ class Lids:
 
     column : (v,) skin vertices that ride on the lids; weight (v,) 1 at the margin, 0 where the lid ends
     axis, forward, up : the eye's frame; along, elevation, radius (v,) the cylindrical coordinates of each vertex
+    hold (v,) share of the lid stiffness with which it is held to its place
     upper : (v,) bool; opening (v,) rad between the margins at the vertex's place
     profile : (b,) eyeball radius over the angle from the gaze, `profile_angle` (b,)
     """
@@ -94,6 +97,7 @@ class Lids:
     elevation: np.ndarray
     radius: np.ndarray
     upper: np.ndarray
+    hold: np.ndarray
     opening: np.ndarray
     contact_column: np.ndarray
     clearance: np.ndarray

@@ -1,0 +1,129 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Lips and cheeks against the teeth: each dental arch as a wall round a vertical axis behind it.
+
+The wall's radius over angle and height is read off the teeth once. A wall is robust where single teeth are not: a lip
+that was in front of the arch is pushed to the front again however deep it got, and no vertex catches on an edge.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import gaussian_filter, maximum_filter, minimum_filter
+
+from ..anatomy.head import Head
+from .layers import Layers
+from .planes import Planes, empty_planes
+
+_ANGLES, _HEIGHTS = 96, 16
+_CLEARANCE = 0.25
+
+
+@dataclass(frozen=True, eq=False)
+class Arch:
+    """One row of teeth. centre (2,) mm: x, y of the axis; bottom, top mm; radius (a, h) over angle from the front
+    (-pi..pi) and height, 0 where there are no teeth; column (c,) skin columns in front of it, clearance (c,) mm;
+    lower: it moves with the mandible."""
+
+    centre: np.ndarray
+    bottom: float
+    top: float
+    radius: np.ndarray
+    column: np.ndarray
+    clearance: np.ndarray
+    lower: bool
+
+    def coordinates(self, points):
+        """Angle (k,), distance from the axis (k,) and unit radial direction (k, 3)."""
+        rel = points[:, :2] - self.centre
+        far = np.maximum(np.hypot(rel[:, 0], rel[:, 1]), 1e-6)
+        radial = np.concatenate([rel / far[:, None], np.zeros((len(rel), 1))], axis=1)
+        return np.arctan2(rel[:, 0], -rel[:, 1]), far, radial
+
+    def wall(self, angle, height):
+        """Radius of the wall (k,), its slope over the angle and over the height."""
+        a = (angle + np.pi) / (2 * np.pi) * _ANGLES - 0.5
+        z = (height - self.bottom) / (self.top - self.bottom) * (_HEIGHTS - 1)
+        inside = (z >= 0) & (z <= _HEIGHTS - 1)
+        z = np.clip(z, 0, _HEIGHTS - 1.001)
+        i, j = np.floor(a).astype(int), np.floor(z).astype(int)
+        u, v = a - i, z - j
+        i, k = i % _ANGLES, (i + 1) % _ANGLES
+        r = self.radius
+        low, high = r[i, j] * (1 - u) + r[k, j] * u, r[i, j + 1] * (1 - u) + r[k, j + 1] * u
+        over_angle = ((r[k, j] - r[i, j]) * (1 - v) + (r[k, j + 1] - r[i, j + 1]) * v) * _ANGLES / (2 * np.pi)
+        over_height = (high - low) * (_HEIGHTS - 1) / (self.top - self.bottom)
+        return np.where(inside, low * (1 - v) + high * v, 0.0), over_angle, over_height
+
+
+def build_arches(head: Head, layers: Layers) -> tuple[Arch, ...]:
+    """The walls of both rows of teeth."""
+    n = len(layers.area)
+    zero = np.zeros(n)
+    near_mouth = np.zeros(n, bool)
+    for name in ("lip_upper", "lip_lower", "mouth_bag", "chin", "cheek_l", "cheek_r"):
+        near_mouth |= np.asarray(head.groups.get(name, zero)) > 0.05
+    near_mouth &= layers.free[:n]
+    arches = []
+    for part in ("teeth_upper", "teeth_lower"):
+        mesh = head.parts.get(part)
+        if mesh is None or len(mesh.vertices) < 50:
+            continue
+        tri = mesh.vertices[mesh.triangles]
+        weights = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [0.5, 0.5, 0], [0, 0.5, 0.5], [0.5, 0, 0.5], [1 / 3] * 3])
+        points = np.einsum("sk,tkj->tsj", weights, tri).reshape(-1, 3)
+        low, high = points.min(axis=0), points.max(axis=0)
+        centre = np.array([(low[0] + high[0]) / 2, low[1] + 0.75 * (high[1] - low[1])])
+        arch = Arch(
+            centre, low[2], high[2], np.zeros((_ANGLES, _HEIGHTS)), np.zeros(0, int), np.zeros(0), "lower" in part
+        )
+        angle, far, _ = arch.coordinates(points)
+        i = np.floor((angle + np.pi) / (2 * np.pi) * _ANGLES).astype(int) % _ANGLES
+        j = np.clip(np.rint((points[:, 2] - low[2]) / (high[2] - low[2]) * (_HEIGHTS - 1)).astype(int), 0, _HEIGHTS - 1)
+        np.maximum.at(arch.radius, (i, j), far)
+        # close the gaps between teeth and rows of points, then even out; angles wrap round
+        closed = minimum_filter(
+            maximum_filter(arch.radius, (5, 3), mode=("wrap", "nearest")), (3, 1), mode=("wrap", "nearest")
+        )
+        arch.radius[:] = gaussian_filter(closed, (1.0, 0.7), mode=("wrap", "nearest"))
+        column = np.flatnonzero(near_mouth & (np.linalg.norm(head.skin.vertices[:, :2] - centre, axis=1) < 75))
+        skin = head.skin.vertices[column]
+        angle, far, _ = arch.coordinates(skin)
+        # at any height: what stands in front of the row where it is highest is in front of it
+        ahead = arch.radius.max(axis=1)[np.floor((angle + np.pi) / (2 * np.pi) * _ANGLES).astype(int) % _ANGLES]
+        in_front = (ahead > 0) & (far > ahead - 1.5)
+        wall, _, _ = arch.wall(angle, skin[:, 2])
+        clearance = np.where(wall > 0, np.minimum(far - wall, _CLEARANCE), np.minimum(far - ahead, _CLEARANCE))
+        arches.append(
+            Arch(centre, low[2], high[2], arch.radius, column[in_front], clearance[in_front], "lower" in part)
+        )
+    return tuple(arches)
+
+
+def arch_contacts(surfaces, positions, rotation, translation) -> Planes:
+    """Planes that keep lips, cheeks and mouth bag in front of the teeth; the lower row moves with the mandible."""
+    node, normal, level = [], [], []
+    for arch in surfaces.arches:
+        points = positions[arch.column]
+        if arch.lower:
+            points = (points - translation) @ rotation
+        angle, far, radial = arch.coordinates(points)
+        wall, over_angle, over_height = arch.wall(angle, points[:, 2])
+        keep = (wall > 0) & (far < wall + 4.0)
+        if not keep.any():
+            continue
+        angle, far, radial, wall = angle[keep], far[keep], radial[keep], wall[keep]
+        tangent = np.stack([np.cos(angle), np.sin(angle), np.zeros(len(angle))], axis=1)
+        slope = np.clip(over_angle[keep] / far, -0.7, 0.7)
+        rise = np.clip(over_height[keep], -0.5, 0.5)
+        n = radial - slope[:, None] * tangent - rise[:, None] * [0.0, 0, 1]
+        n /= np.linalg.norm(n, axis=1, keepdims=True)
+        missing = (wall + arch.clearance[keep] - far) * np.einsum("ij,ij->i", n, radial)
+        if arch.lower:
+            n = n @ rotation.T
+        node.append(arch.column[keep])
+        normal.append(n)
+        level.append(np.einsum("ij,ij->i", positions[arch.column[keep]], n) + missing)
+    if not node:
+        return empty_planes()
+    node, normal, level = (np.concatenate(x) for x in (node, normal, level))
+    return Planes(node, normal, level, np.full(len(node), -1))

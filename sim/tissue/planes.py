@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Contacts as points against planes: their energy, and projection out of what is left."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True, eq=False)
+class Planes:
+    """Active contacts: node (c,), normal (c, 3), level (c,): node · normal must not fall under level.
+
+    partner (c,) node that carries the plane or -1 (then the plane is fixed); offset for partnered ones.
+    """
+
+    node: np.ndarray
+    normal: np.ndarray
+    level: np.ndarray
+    partner: np.ndarray
+
+
+def empty_planes() -> Planes:
+    """No contact."""
+    return Planes(np.zeros(0, int), np.zeros((0, 3)), np.zeros(0), np.zeros(0, int))
+
+
+def joined(*planes: Planes) -> Planes:
+    """All of them in one table."""
+    return Planes(*(np.concatenate([getattr(p, f) for p in planes]) for f in ("node", "normal", "level", "partner")))
+
+
+def depths(planes: Planes, positions) -> np.ndarray:
+    """(c,) mm of penetration, 0 where apart."""
+    here = np.einsum("ij,ij->i", positions[planes.node], planes.normal)
+    paired = planes.partner >= 0
+    if paired.any():
+        here[paired] -= np.einsum("ij,ij->i", positions[planes.partner[paired]], planes.normal[paired])
+    return np.maximum(planes.level - here, 0)
+
+
+def contact_energy(planes: Planes, positions, stiffness: float) -> tuple[float, np.ndarray]:
+    """Energy ½ k Σ depth² and its gradient over all nodes."""
+    depth = depths(planes, positions)
+    gradient = np.zeros_like(positions)
+    hit = np.flatnonzero(depth > 0)
+    if not len(hit):
+        return 0.0, gradient
+    push = -stiffness * depth[hit, None] * planes.normal[hit]
+    pair = planes.partner[hit]
+    for axis in range(3):
+        gradient[:, axis] += np.bincount(planes.node[hit], push[:, axis], minlength=len(positions))
+        both = pair >= 0
+        if both.any():
+            gradient[:, axis] -= np.bincount(pair[both], push[both, axis], minlength=len(positions))
+    return 0.5 * stiffness * float(depth @ depth), gradient
+
+
+def project(planes: Planes, positions, rounds: int = 2) -> np.ndarray:
+    """Positions with what is left of penetration removed; partners share the way."""
+    out = positions.copy()
+    for _ in range(rounds):
+        depth = depths(planes, out)
+        hit = np.flatnonzero(depth > 1e-6)
+        if not len(hit):
+            break
+        pair = planes.partner[hit]
+        part = np.where(pair >= 0, 0.5, 1.0)
+        push = (part * depth[hit])[:, None] * planes.normal[hit]
+        both = pair >= 0
+        nodes = np.concatenate([planes.node[hit], pair[both]])
+        moves = np.concatenate([push, -push[both]])
+        count = np.bincount(nodes, minlength=len(out))
+        for axis in range(3):
+            out[:, axis] += np.bincount(nodes, moves[:, axis], minlength=len(out)) / np.maximum(count, 1)
+    return out
