@@ -1,0 +1,149 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where bone may be under a given skin: the skin without its ears, how deep the tissue is, and where each skull
+landmark must come to lie."""
+
+import numpy as np
+from scipy.sparse import coo_matrix, diags
+from scipy.sparse.linalg import splu
+from scipy.spatial import cKDTree
+
+from ...sim.anatomy.tissue_depth import skin_counterparts, table
+from ...sim.mesh import Mesh, edges, vertex_normals
+
+#: Bone stays this far from any skin, the lining of the mouth included, mm.
+CLEARANCE = 2.5
+
+
+class BoneSpace:
+    """The room for bone under a skin.
+
+    Attributes
+    ----------
+    targets : bone landmark -> (3,) mm: the 22 of the skull and ``gn pr id``, at their tissue depth under the skin
+    normals : bone landmark -> (3,) outward direction of the skin there
+    """
+
+    def __init__(self, skin: Mesh, groups: dict[str, np.ndarray], landmarks: dict[str, np.ndarray]):
+        self.landmarks = {name: np.asarray(p, float) for name, p in landmarks.items()}
+        triangles = skin.triangles
+        inner = _weights(groups, "inner", skin) + _weights(groups, "mouth_bag", skin) > 0.5
+        vertices = _without_ears(skin, _weights(groups, "ear_l", skin) + _weights(groups, "ear_r", skin))
+        triangles = triangles[vertices[triangles, 2].max(axis=1) > self.landmarks["gn"][2] - 25]
+        outer = triangles[~inner[triangles].all(axis=1)]
+        self.points, self.directions = _sampled(vertices, outer, 2.5)
+        self._tree = cKDTree(self.points)
+        self._all, self._all_directions = _sampled(vertices, triangles, 2.5)
+        self._all_tree = cKDTree(self._all)
+        self._place_targets()
+        known = {**skin_counterparts(self.landmarks), **self._extra_counterparts()}
+        self._depth_at = np.array([known[n] for n in known if not n.startswith(("po", "ans"))])
+        self._depth_of = np.array([table()[_base(n)].mean for n in known if not n.startswith(("po", "ans"))])
+        self.depth = self._depth(self.points)
+
+    def _extra_counterparts(self):
+        return {"gn": self.landmarks["gn"], "pr": self.landmarks["ls"], "id": self.landmarks["li"]}
+
+    def _depth(self, points):
+        """(n,) mm: the table's depths spread over the skin, nearest landmarks weighing most (Shepard 1968)."""
+        weight = 1 / (np.linalg.norm(points[:, None] - self._depth_at[None], axis=2) ** 3 + 1e-3)
+        return weight @ self._depth_of / weight.sum(axis=1)
+
+    def _place_targets(self):
+        self.targets, self.normals = {}, {}
+        for name, at in {**skin_counterparts(self.landmarks), **self._extra_counterparts()}.items():
+            middle = not name.endswith(("_l", "_r"))
+            if name == "rhi":  # its counterpart is a point between landmarks: drop it onto the nasal bridge
+                at = self.points[self._bridge(at)]
+            normal = self.smooth_normal(at)
+            if _base(name) == "po":
+                normal = np.array([np.sign(at[0]), 0.0, 0.0])
+            elif name in ("ans", "pr", "id", "sl"):
+                normal = np.array([0.0, -1.0, 0.0])
+            if middle:
+                normal[0], at = 0.0, at * [0, 1, 1]
+            normal = normal / np.linalg.norm(normal)
+            self.normals[name] = normal
+            self.targets[name] = at - table()[_base(name)].mean * normal
+
+    def _bridge(self, at):
+        near = np.abs(self.points[:, 0]) < 2
+        cost = np.where(near, np.linalg.norm(self.points - at, axis=1), np.inf)
+        return int(cost.argmin())
+
+    def smooth_normal(self, at, radius=7.0):
+        """(3,) outward direction of the skin around a point."""
+        near = self._tree.query_ball_point(at, 2 * radius)
+        distance = np.linalg.norm(self.points[near] - at, axis=1)
+        total = (np.exp(-((distance / radius) ** 2))[:, None] * self.directions[near]).sum(axis=0)
+        return total / np.linalg.norm(total)
+
+    def depth_below(self, points):
+        """(n,) mm under the outer skin, negative outside."""
+        return _signed(points, self._tree, self.points, self.directions)[0]
+
+    def too_shallow(self, points, share=1.0):
+        """(n,) mm, positive where bone would be nearer to the skin than its depth there (times ``share``)."""
+        below, near = _signed(points, self._tree, self.points, self.directions)
+        clear = _signed(points, self._all_tree, self._all, self._all_directions)[0]
+        return np.maximum(share * self.depth[near] - below, CLEARANCE - clear)
+
+    def snapped(self, mesh: Mesh, names, reach=18.0) -> Mesh:
+        """``mesh`` gently pushed so that its surface passes through the targets named (symmetric)."""
+        vertices = mesh.vertices
+        for _ in range(4):
+            tree = cKDTree(_sampled(vertices, mesh.triangles, 1.0)[0])
+            at = np.array([self.targets[n] for n in names])
+            off = at - tree.data[tree.query(at)[1]]
+            weight = np.exp(-((np.linalg.norm(at[:, None] - at[None], axis=2) / reach) ** 2))
+            push = np.linalg.solve(weight + 1e-6 * np.eye(len(at)), off)
+            vertices = vertices + np.exp(-((np.linalg.norm(vertices[:, None] - at[None], axis=2) / reach) ** 2)) @ push
+        return mesh.moved(vertices)
+
+
+def _base(name):
+    return name.removesuffix("_l").removesuffix("_r")
+
+
+def _weights(groups, name, skin):
+    return np.asarray(groups.get(name, np.zeros(len(skin.vertices))), float)
+
+
+def _sampled(vertices, triangles, spacing):
+    """Points (k, 3) about ``spacing`` mm apart on a surface, and the smooth normals there."""
+    normal = vertex_normals(vertices, triangles)
+    corner, corner_normal = vertices[triangles], normal[triangles]
+    side = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2).max(axis=1)
+    parts = np.maximum(1, np.ceil(side / spacing)).astype(int)
+    points, normals = [], []
+    for n in np.unique(parts):
+        i, j = (a.ravel() for a in np.meshgrid(np.arange(n + 1), np.arange(n + 1), indexing="ij"))
+        keep = i + j <= n
+        w = np.stack([i[keep], j[keep], n - i[keep] - j[keep]], axis=1) / n
+        some = parts == n
+        points.append(np.einsum("wk,tkd->twd", w, corner[some]).reshape(-1, 3))
+        normals.append(np.einsum("wk,tkd->twd", w, corner_normal[some]).reshape(-1, 3))
+    points, normals = np.concatenate(points), np.concatenate(normals)
+    return points, normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
+
+
+def _signed(points, tree, samples, normals):
+    distance, near = tree.query(points)
+    outside = ((points - samples[near]) * normals[near]).sum(1) > 0
+    return np.where(outside, -distance, distance), near
+
+
+def _without_ears(skin, ear):
+    """Skin vertices with the ears replaced by the membrane that spans their roots (harmonic fill)."""
+    free = np.flatnonzero(ear > 0.5)
+    if len(free) == 0:
+        return skin.vertices
+    e = edges(skin.faces)
+    n = len(skin.vertices)
+    link = coo_matrix((np.ones(2 * len(e)), (np.r_[e[:, 0], e[:, 1]], np.r_[e[:, 1], e[:, 0]])), shape=(n, n)).tocsr()
+    laplace = (diags(np.asarray(link.sum(1)).ravel()) - link).tocsr()
+    fixed = np.setdiff1d(np.arange(n), free)
+    vertices = skin.vertices.copy()
+    vertices[free] = splu(laplace[free][:, free].tocsc()).solve(-(laplace[free][:, fixed] @ vertices[fixed]))
+    return vertices
+
+
