@@ -22,14 +22,17 @@ NEAR = 12.0  # mm: bone deeper than this needs no test
 def depth_under(points, skin: Surface, reach: float = np.inf):
     """How deep ``points`` (k, 3) lie under the skin, mm, negative outside; and the `Contacts` found.
 
-    Points out of reach are as deep as ``reach``. Inside and outside by the winding number, so the closed cups behind
-    lips and lids count as outside.
+    Points out of reach are as deep as ``reach``. Where the normal at the closest point is plain about the side it
+    decides, else the winding number; the closed cups behind lips and lids count as outside.
     """
     found = skin.closest(points, reach)
     depth = np.where(found.found, found.distance, reach)
     near = np.flatnonzero(found.found)
-    inner = winding_number(points[near], skin.vertices, skin.triangles) > 0.5
-    depth[near[~inner]] *= -1
+    rise = np.einsum("ij,ij->i", points[near] - found.points[near], found.normals[near])
+    out = rise > 0
+    unsure = np.flatnonzero(np.abs(rise) < 0.7 * found.distance[near])
+    out[unsure] = winding_number(points[near[unsure]], skin.vertices, skin.triangles) < 0.5
+    depth[near[out]] *= -1
     return depth, found
 
 
@@ -83,7 +86,7 @@ def keep_inside(bone: Mesh, skin: Surface, least, rounds: int = 12) -> np.ndarra
         pulled |= bad
         if turn < rounds - 4:
             weight = diags(np.where(pulled, 3.0, 0.0))
-            shift = factorised((smooth + weight).tocsc())((csr_matrix(weight) @ goal))
+            shift = factorised((smooth + weight).tocsc())(csr_matrix(weight) @ goal)
             moved = start + shift
         else:  # what smoothness will not give, is given without
             moved = np.where(bad[:, None], moved + (lack[:, None] + 0.05) * way, moved)

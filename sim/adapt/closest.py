@@ -15,7 +15,6 @@ from scipy.spatial import cKDTree
 from ..mesh import vertex_normals
 from .triangle_projection import closest_on_triangles
 
-
 SAMPLES = 250_000  # a finer cover does not pay for the time its tree takes
 
 

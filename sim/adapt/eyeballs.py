@@ -4,8 +4,7 @@
 import numpy as np
 
 from ..anatomy.head import Eye
-from ..mesh import vertex_normals
-from .thin_plate_spline import similarity
+from .thin_plate_spline import least_turn, similarity
 
 SMALLEST, LARGEST = 9.5, 13.0  # mm: from a child of one year to a large adult eye
 LID = 0.6  # mm of lid between the eyeball and the skin seen from outside
@@ -52,13 +51,11 @@ def place_eye(eye: Eye, warped, reference_skin, fitted_skin, lid, inner, scale: 
 
 def carried_eyeball(vertices, old: Eye, new: Eye) -> np.ndarray:
     """The eyeball's vertices (n, 3): the same rigid shape, scaled to the new radius and turned to the new gaze."""
-    from .thin_plate_spline import _least_turn
-
-    turn = _least_turn(old.gaze, new.gaze)
+    turn = least_turn(old.gaze, new.gaze)
     return (vertices - old.centre) @ turn.T * (new.radius / old.radius) + new.centre
 
 
-def lids_over(skin, faces_triangles, eye: Eye, profile, rows, gap) -> np.ndarray:
+def lids_over(skin, eye: Eye, profile, rows, gap) -> np.ndarray:
     """Skin vertices (n, 3) with ``rows`` moved out of the eyeball to at least ``gap`` (rows,) mm above it."""
     out = np.array(skin)
     away = out[rows] - eye.centre
@@ -78,6 +75,3 @@ def profile_of(vertices, eye: Eye):
     grid = np.linspace(0, np.pi, 61)
     reach = np.array([max([eye.radius, *length[np.abs(angle - g) < 0.08]]) for g in grid])
     return lambda a: np.interp(a, grid, reach)
-
-
-__all__ = ["carried_eyeball", "lids_over", "place_eye", "profile_of", "vertex_normals"]

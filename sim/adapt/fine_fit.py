@@ -37,7 +37,8 @@ STRETCH = 0.002  # weight of first differences, which keeps the mesh from slidin
 class Anchors:
     """Landmarks on the skin and where they belong.
 
-    sampling (k, n) sparse rows that give the landmark from the vertices; target (k, 3) mm; weight (k,).
+    sampling (k, n) sparse rows that give the landmark (or the offset between two points) from the vertices; target
+    (k, 3) mm; weight (k,), 1 for a point of data.
     """
 
     sampling: csr_matrix
@@ -101,7 +102,7 @@ def fine_fit(vertices, faces, triangles, free, target: Surface, anchors: Anchors
         robust = trust[use] / (1 + (height / width) ** 2) ** 2
         blocks = robust[:, None, None] * (facing[:, :, None] * facing[:, None, :] + ALONG * np.eye(3))
         goal = look[use] @ displacement + gap
-        hold = np.repeat(anchors.weight[:, None, None] * np.eye(3)[None], 1, axis=0)
+        hold = anchors.weight[:, None, None] * np.eye(3)
         want = anchors.target - anchors.sampling @ base
         sampling = vstack([look[use], anchors.sampling]).tocsr()
         blocks = np.concatenate([blocks, hold])

@@ -4,7 +4,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import csr_matrix
+from scipy.sparse import csr_matrix, vstack
 
 from ..anatomy.head import Head, SurfacePoints
 from ..anatomy.landmark_names import SKIN
@@ -13,10 +13,12 @@ from ..progress import Progress, Work
 from .closest import Surface
 from .completion import complete_positions, sigma
 from .fine_fit import Anchors, Fitted, fine_fit
+from .openings import closed_eyes, rim_anchors, rims
 from .refine import Pairs, refine
-from .thin_plate_spline import ThinPlateSpline, WarpChain
+from .thin_plate_spline import ThinPlateSpline, WarpChain, similarity
 
 EAR_MARKS = ("sa", "sba", "pra", "pa", "obs", "obi", "t")
+STIFF = tuple(f"{x}_{s}" for x in ("lid_upper", "lid_lower", "nostril") for s in ("l", "r"))
 CARRIED = 12.0  # mm a landmark that was not given may give way
 PICKED = 0.25  # share of a landmark's uncertainty that it may give way
 HOLD = 0.15  # weight in the last stage of a landmark picked to 1 mm, against 1 for a point of data
@@ -80,7 +82,9 @@ def fit_skin(reference: Head, target: Surface, given: dict[str, np.ndarray]) -> 
     known = np.array([name in given for name in names])
     now = rows @ moved
     pairs = Pairs(now, np.where(known[:, None], goal, now), give)
-    work = refine(moved, outer, target, feature_triangles(reference, names), pairs)
+    rim = rims(reference)
+    calm = refinable(reference, outer, rim)
+    work = refine(moved, calm, target, feature_triangles(reference, names), pairs)
     warps = None
     while warps is None:
         try:
@@ -92,9 +96,16 @@ def fit_skin(reference: Head, target: Surface, given: dict[str, np.ndarray]) -> 
         chain = chain.then(warp)
         moved = warp.transform(moved)
 
-    free, stiffness = freedom(reference, given)
+    free, stiffness = freedom(reference, given, rim)
     weight = np.array([HOLD / sigma(name) ** 2 if name in given else 0.0 for name in names])
-    work = fine_fit(moved, skin.faces, triangles, free, target, Anchors(rows, goal, weight), stiffness)
+    matrix, _ = similarity(skin.vertices, moved)
+    together = rim_anchors(reference, rim, matrix, closed_eyes(reference, landmarks, given))
+    anchors = Anchors(
+        vstack([rows, together.sampling]).tocsr(),
+        np.concatenate([goal, together.target]),
+        np.concatenate([weight, together.weight]),
+    )
+    work = fine_fit(moved, skin.faces, triangles, free, target, anchors, stiffness)
     fitted = None
     while fitted is None:
         try:
@@ -119,11 +130,20 @@ def facing_out(target: Surface, skin: np.ndarray, outer: np.ndarray) -> Surface:
     return target.turned() if len(agree) and np.median(agree) < -0.2 else target
 
 
-def freedom(reference: Head, given):
+def refinable(reference: Head, outer: np.ndarray, rim: np.ndarray) -> np.ndarray:
+    """The triangles of ``outer`` on which refinement may place landmarks: neither rims nor ears, whose folds lie closer
+    together than the feature mesh can tell apart."""
+    ear = np.maximum(group(reference, "ear_l"), group(reference, "ear_r")) > 0.3
+    return outer[~(rim | ear)[outer].any(axis=1)]
+
+
+def freedom(reference: Head, given, rim):
     """Which skin vertices look for data (n,) bool, and how stiff each is (n,)."""
     inner = group(reference, "inner") > 0.5
-    free = ~inner
-    stiffness = 1 + 3.0 * inner + 2.0 * group(reference, "neck") + 1.0 * group(reference, "scalp")
+    free = ~inner & ~rim
+    stiffness = 1 + 3.0 * inner + 8.0 * rim + 2.0 * group(reference, "neck") + 1.0 * group(reference, "scalp")
+    for name in STIFF:
+        stiffness += 4.0 * group(reference, name)
     for side, seen in seen_ears(given).items():
         ear = group(reference, f"ear_{side}")
         stiffness += (4.0 if seen else 60.0) * ear

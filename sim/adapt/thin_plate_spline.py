@@ -33,7 +33,7 @@ def similarity(source, target, weights=None, mirror: bool | None = False):
     wanted = sign if mirror is None else (-1.0 if mirror else 1.0)
     flip = np.array([1.0, 1.0, sign * wanted])
     if mirror is False and s[1] <= 1e-9 * s[0]:  # all on one line: the turn about it is free, take none
-        rotation = _least_turn(vt[0], u[:, 0])
+        rotation = least_turn(vt[0], u[:, 0])
         scale = s[0] / spread
     else:
         rotation = (u * flip) @ vt
@@ -44,7 +44,7 @@ def similarity(source, target, weights=None, mirror: bool | None = False):
     return matrix, q0 - matrix @ p0
 
 
-def _least_turn(a, b):
+def least_turn(a, b):
     """Rotation by the smallest angle that takes unit vector ``a`` to ``b``."""
     v, c = np.cross(a, b), float(a @ b)
     if c < -1 + 1e-12:

@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Scan and landmarks in, a whole head out (Kähler et al. 2002, section 6)."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..anatomy.head import Head
+from ..anatomy.landmark_names import SKIN
+from ..errors import InputError
+from ..mesh import Mesh
+from ..progress import Progress, Work, portion
+from .bone import NEAR, depth_under
+from .carry import BONES, carry
+from .closest import Surface
+from .gate import check_against_scan, check_arrangement
+from .landmarks import require_usable
+from .skin_fit import SkinFit, fit_skin, group
+
+NORMALS = 2.0  # mm over which the scan's normals are averaged
+POOR = 5.0  # mm: a mean distance in the face above which the fit is refused
+LITTLE = 0.08  # share of the face that must have data
+WITHIN = 1.0  # mm: skin counts as lying on the scan
+
+
+@dataclass(frozen=True, eq=False)
+class BuildResult:
+    """What `build_head` returns.
+
+    head : the fitted head, in the scan's own place (mm)
+    fit : mean_mm, p95_mm, max_mm (skin to scan, where the face has data), coverage (share of the face with data),
+        landmark_mean_mm (given landmarks to the skin's own), and the share ``within_1mm``
+    anatomy : muscles (count), skull_penetrations (bone vertices outside the skin), tissue_thickness_mm
+    landmarks_missing : names of landmarks that were not given
+    attributes : per skin vertex (n,) float32: ``fitted`` 0..1 (0: invented by the warp), ``distance_mm`` to the scan
+        (positive outside, NaN where there is no data)
+    """
+
+    head: Head
+    fit: dict
+    anatomy: dict
+    landmarks_missing: tuple[str, ...]
+    attributes: dict[str, np.ndarray] = field(default_factory=dict)
+
+
+def build_head(reference: Head, scan: Mesh, landmarks: dict[str, np.ndarray]) -> Work:
+    """Work returning the `BuildResult` for a scan (mm, any place) with four or more ``landmarks`` (name -> mm).
+
+    Raises
+    ------
+    InputError : the landmarks are too few, do not form a face, or do not belong to this scan; or no good fit was found.
+    """
+    given = {n: np.asarray(p, dtype=float) for n, p in landmarks.items() if n in SKIN}
+    require_usable(given, "The landmark set")
+    yield Progress(0.0, "Looking at the scan")
+    target = Surface(scan.vertices, scan.triangles, smooth=NORMALS)
+    check_against_scan(given, target)
+    check_arrangement(reference.landmark_positions(), given)
+    fit = yield from portion(fit_skin(reference, target, given), 0.1, 0.7)
+    report = fit_report(reference, fit, given)
+    refuse_poor(report)
+    carried = yield from portion(carry(reference, fit), 0.7, 0.95)
+    yield Progress(0.95, "Checking the anatomy")
+    head = carried.head
+    anatomy = anatomy_report(head)
+    missing = tuple(n for n in SKIN if n not in given)
+    attributes = {
+        "fitted": fit.fitted.fitted.astype(np.float32),
+        "distance_mm": fit.fitted.distance.astype(np.float32),
+    }
+    return BuildResult(head, report, anatomy, missing, attributes)
+
+
+def fit_report(reference: Head, fit: SkinFit, given) -> dict:
+    """Distances from the fitted skin to the scan in the face, mm, where there is data; see `BuildResult`."""
+    skin = reference.skin
+    face = (group(reference, "face") > 0.5) & (group(reference, "inner") <= 0.5)
+    triangles = skin.triangles[face[skin.triangles].all(axis=1)]
+    vertices = fit.fitted.vertices
+    corners = vertices[triangles]
+    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    found = fit.target.closest(corners.mean(axis=1), 10.0)
+    data = found.found & ~found.border
+    distance, weight = found.distance[data], area[data]
+    marks = reference.landmarks.on({"skin": vertices})
+    off = [float(np.linalg.norm(marks[n] - p)) for n, p in given.items() if n in marks]
+    if len(distance) == 0:
+        distance, weight = np.array([np.inf]), np.ones(1)
+    order = np.argsort(distance)
+    share = np.cumsum(weight[order]) / weight.sum()
+    return {
+        "mean_mm": float(np.average(distance, weights=weight)),
+        "p95_mm": float(distance[order][np.searchsorted(share, 0.95)]),
+        "max_mm": float(distance.max()),
+        "coverage": float(area[data].sum() / area.sum()) if area.sum() else 0.0,
+        "within_1mm": float(weight[distance <= WITHIN].sum() / weight.sum()),
+        "landmark_mean_mm": float(np.mean(off)) if off else 0.0,
+    }
+
+
+def refuse_poor(report: dict) -> None:
+    """Raise `InputError` for a fit that missed the scan."""
+    if report["coverage"] < LITTLE:
+        raise InputError(
+            f"Only {report['coverage']:.0%} of the face lies near the scan: check that scan and landmarks belong together, "
+            "and that the scan shows a face."
+        )
+    if report["mean_mm"] > POOR:
+        raise InputError(
+            f"The fitted skin lies {report['mean_mm']:.1f} mm from the scan on average: check the landmarks, above all "
+            "their sides, or add more of them."
+        )
+
+
+def anatomy_report(head: Head) -> dict:
+    """Count of muscles, bone vertices outside the skin, and the median tissue over the bone that faces the skin, mm."""
+    surface = Surface(head.skin.vertices, head.skin.triangles)
+    outside, thickness = 0, []
+    for name in BONES:
+        depth, _ = depth_under(head.parts[name].vertices, surface, 3 * NEAR)
+        outside += int((depth < -0.05).sum())
+        thickness.append(depth[depth < 3 * NEAR])
+    thickness = np.concatenate(thickness) if thickness else np.zeros(0)
+    return {
+        "muscles": len(head.muscles),
+        "skull_penetrations": outside,
+        "tissue_thickness_mm": {
+            "min": float(thickness.min()) if len(thickness) else None,
+            "median": float(np.median(thickness)) if len(thickness) else None,
+        },
+    }

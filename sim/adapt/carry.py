@@ -1,0 +1,235 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Everything under the skin follows it: bone, eyes, teeth, tongue, muscles (Kähler et al. 2002, section 5.2)."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..anatomy.head import Head
+from ..anatomy.tissue_depth import tissue_vectors
+from ..mesh import Mesh
+from ..progress import Progress, Work
+from . import bone, eyeballs
+from .closest import Surface
+from .refine import thinned
+from .skin_fit import SkinFit, group
+from .thin_plate_spline import ThinPlateSpline, similarity
+
+BONES = ("skull", "mandible")
+TEETH = ("teeth_upper", "teeth_lower")
+AROUND_EYE = 32.0  # mm: bone this near carries the eye
+AROUND_TEETH = 28.0
+COARSE, FINE = 7.0, 2.0  # mm between centres of the last warp: everywhere, and around lids and lips
+
+
+@dataclass(frozen=True, eq=False)
+class Carried:
+    """head : the fitted head; moved : mm by which bone had to give way to the skin (largest)."""
+
+    head: Head
+    moved: float
+
+
+def carry(reference: Head, fit: SkinFit) -> Work:
+    """Work returning the `Carried` head: ``reference`` with the fitted skin and all that lies under it."""
+    skin = reference.skin
+    triangles = skin.triangles
+    inner = group(reference, "inner") > 0.5
+    fitted = fit.fitted.vertices
+    size, _ = similarity(skin.vertices[~inner], fitted[~inner])
+    scale = float(np.cbrt(np.linalg.det(size)))
+
+    yield Progress(0.0, "Skull")
+    deep, through = under_skin(reference, fit)
+    parts = {name: through.transform(deep.transform(reference.parts[name].vertices)) for name in BONES}
+    parts = bone_by_depth(reference, parts, fitted, size / scale, scale)
+    needs = {name: bone_needs(reference, name, scale) for name in BONES}
+    surface = Surface(fitted, triangles)
+    for name in BONES:
+        parts[name] = bone.keep_inside(reference.parts[name].moved(parts[name]), surface, needs[name])
+
+    yield Progress(0.4, "Eyes and teeth")
+    eyes = []
+    for k, side in enumerate(("l", "r")):
+        old = reference.eyes[k]
+        around = near_bone(reference, parts, old.centre[None], AROUND_EYE)
+        lid = np.maximum(group(reference, f"lid_upper_{side}"), group(reference, f"lid_lower_{side}"))
+        new = eyeballs.place_eye(old, around, skin.vertices, fitted, lid, inner, scale)
+        eyes.append(new)
+        parts[f"eye_{side}"] = eyeballs.carried_eyeball(reference.parts[f"eye_{side}"].vertices, old, new)
+    mouth = mouth_similarity(reference, parts, fitted, fit.outer)
+    for name in (*TEETH, "tongue"):
+        parts[name] = mouth(reference.parts[name].vertices)
+
+    yield Progress(0.55, "Inner skin and muscles")
+    warp = inner_warp(reference, parts, fitted)
+    final = fitted.copy()
+    final[inner] = warp.transform(skin.vertices[inner])
+    for k, side in enumerate(("l", "r")):
+        final = lids_on_eye(reference, final, parts[f"eye_{side}"], eyes[k], k, side, inner)
+    muscles = tuple(carried_muscle(m, warp) for m in reference.muscles)
+
+    yield Progress(0.75, "Bone under the skin")
+    surface = Surface(final, triangles)
+    moved = 0.0
+    for name in BONES:
+        before = parts[name]
+        parts[name] = bone.keep_inside(reference.parts[name].moved(before), surface, needs[name])
+        moved = max(moved, float(np.linalg.norm(parts[name] - before, axis=1).max()))
+    jaw = carried_jaw(reference, parts, mouth, scale)
+    parts["skin"] = final
+    head = replace(reference.with_vertices(parts), muscles=muscles, jaw=jaw, eyes=tuple(eyes))
+    return Carried(head, moved)
+
+
+def under_skin(reference: Head, fit: SkinFit):
+    """The warps of space up to the last stage, and one more that follows what the last stage added (step 4)."""
+    outer = np.unique(fit.outer)
+    before = fit.chain.transform(reference.skin.vertices[outer])
+    pick = thinned(before, COARSE)
+    source, target = before[pick], fit.fitted.vertices[outer][pick]
+    return fit.chain, ThinPlateSpline.fit(source, target, 1.0)
+
+
+def bone_by_depth(reference: Head, parts, fitted, turn, scale):
+    """Skull and mandible moved so that their landmarks lie a tissue depth under the skin's (step 6)."""
+    vertices = {**reference.vertices(), **parts, "skin": fitted}
+    vectors = tissue_vectors(reference.landmark_positions(), reference.skull_landmark_positions())
+    # Soft tissue grows less than the head does: the depths of a small head shrink by half as much.
+    vectors = {name: (scale**0.5) * turn @ v for name, v in vectors.items()}
+    marks = reference.skull_landmarks.on(vertices)
+    landmarks = reference.landmarks.on(vertices)
+    return {name: bone.follow_skin(parts[name], marks, landmarks, vectors) for name in parts}
+
+
+def bone_needs(reference: Head, name: str, scale: float) -> np.ndarray:
+    """(n,) mm of tissue that must remain over each vertex of a bone, from what the reference has there."""
+    surface = Surface(reference.skin.vertices, reference.skin.triangles)
+    depth, found = bone.depth_under(reference.parts[name].vertices, surface, bone.NEAR)
+    inner = group(reference, "inner") > 0.5
+    # `Surface` welds, so the cups are told by the skin's own nearest vertex.
+    from scipy.spatial import cKDTree
+
+    nearest = cKDTree(reference.skin.vertices).query(np.where(found.found[:, None], found.points, 0.0))[1]
+    return bone.least_depth(depth, inner[nearest] & found.found) * min(scale, 1.0)
+
+
+def near_bone(reference: Head, parts, points, radius):
+    """Callable that carries points as the bone within ``radius`` mm of ``points`` (k, 3) moves: a similarity."""
+    source = np.concatenate([reference.parts[name].vertices for name in BONES])
+    target = np.concatenate([parts[name] for name in BONES])
+    from scipy.spatial import cKDTree
+
+    pick = cKDTree(points).query(source)[0] < radius
+    if pick.sum() < 12:
+        pick[:] = True
+    matrix, shift = similarity(source[pick], target[pick])
+    return lambda x: np.asarray(x) @ matrix.T + shift
+
+
+def mouth_similarity(reference: Head, parts, fitted, outer):
+    """Callable that carries teeth and tongue: rigid crowns on the jaws' own movement, as far behind the lips as ever.
+
+    One similarity for both jaws, so that the teeth bite as they do on the reference.
+    """
+    teeth = np.concatenate([reference.parts[name].vertices for name in TEETH])
+    with_bone = near_bone(reference, parts, teeth, AROUND_TEETH)
+    before = Surface(reference.skin.vertices, outer).closest(teeth)
+    moved = with_bone(teeth)
+    after = Surface(fitted, outer).closest(moved)
+    front = before.distance < np.percentile(before.distance, 30)
+    lack = 0.7 * before.distance[front] - after.distance[front]
+    back = max(0.0, float(np.percentile(lack, 95)))
+    if back:
+        inward = (moved[front] - after.points[front]) / np.maximum(after.distance[front, None], 1e-9)
+        way = inward.mean(axis=0)
+        back_shift = back * way / max(np.linalg.norm(way), 1e-9)
+    else:
+        back_shift = np.zeros(3)
+    return lambda x: with_bone(x) + back_shift
+
+
+def inner_warp(reference: Head, parts, fitted) -> ThinPlateSpline:
+    """The warp for what lies between the surfaces: skin seen from outside, bone, eyeballs and teeth all carry it."""
+    skin = reference.skin.vertices
+    outer = np.flatnonzero(group(reference, "inner") <= 0.5)
+    busy = np.zeros(len(skin), dtype=bool)
+    for name in ("lip_upper", "lip_lower", "lid_upper_l", "lid_upper_r", "lid_lower_l", "lid_lower_r"):
+        busy |= group(reference, name) > 0.3
+    for name in ("nostril_l", "nostril_r"):
+        busy |= group(reference, name) > 0.3
+    near = outer[busy[outer]]
+    near = near[thinned(skin[near], FINE * 0.25)]
+    far = outer[~busy[outer]]
+    far = far[thinned(skin[far], COARSE)]
+    source, target = [skin[near], skin[far]], [fitted[near], fitted[far]]
+    for name, gap in (("skull", 9.0), ("mandible", 7.0), ("eye_l", 4.0), ("eye_r", 4.0), *((n, 4.0) for n in TEETH)):
+        vertices = reference.parts[name].vertices
+        pick = thinned(vertices, gap)
+        source.append(vertices[pick])
+        target.append(parts[name][pick])
+    source, target = np.concatenate(source), np.concatenate(target)
+    keep = thinned(source, 0.2)
+    return ThinPlateSpline.fit(source[keep], target[keep], 0.05)
+
+
+def lids_on_eye(reference: Head, skin, ball, eye, k: int, side: str, inner):
+    """Lids outside the eyeball: their backs touch it, their outside keeps a lid's thickness above it."""
+    old = reference.eyes[k]
+    lid = np.maximum(group(reference, f"lid_upper_{side}"), group(reference, f"lid_lower_{side}"))
+    rest = reference.skin.vertices - old.centre
+    height = np.linalg.norm(rest, axis=1) - eyeballs.profile_of(reference.parts[f"eye_{side}"].vertices, old)(
+        angle_from(rest, old.gaze)
+    )
+    rows = np.flatnonzero((lid > 0.05) & (height < 0.4 * old.radius) & (rest @ old.gaze > 0))
+    if len(rows) == 0:
+        return skin
+    gap = np.where(inner[rows], np.clip(height[rows], 0.02, 0.1), np.clip(height[rows], 0.05, 0.5))
+    return eyeballs.lids_over(skin, eye, eyeballs.profile_of(ball, eye), rows, gap)
+
+
+def angle_from(vectors, direction):
+    """(k,) rad between vectors (k, 3) and a unit direction."""
+    length = np.linalg.norm(vectors, axis=1)
+    return np.arccos(np.clip(vectors @ direction / np.maximum(length, 1e-9), -1, 1))
+
+
+def carried_muscle(muscle, warp):
+    """A muscle whose fibres, centre and shape went through ``warp``; widths follow the local scale."""
+    fibres = warp.transform(muscle.fibres)
+    across = _length(fibres) / max(_length(muscle.fibres), 1e-9)
+    centre = None if muscle.centre is None else warp.transform(muscle.centre[None])[0]
+    shape: Mesh = muscle.shape.moved(warp.transform(muscle.shape.vertices))
+    grow = float(np.clip(across, 0.5, 1.6)) ** 0.5
+    return replace(
+        muscle,
+        fibres=fibres,
+        centre=centre,
+        shape=shape,
+        width=muscle.width * grow,
+        thickness=muscle.thickness * grow,
+    )
+
+
+def _length(fibres) -> float:
+    return float(np.linalg.norm(np.diff(fibres, axis=1), axis=2).sum(axis=1).mean())
+
+
+def carried_jaw(reference: Head, parts, mouth, scale: float):
+    """The hinge on the fitted mandible: condyles with the bone around them, the incisor with the teeth."""
+    old = reference.jaw
+    source, target = reference.parts["mandible"].vertices, parts["mandible"]
+    condyles = []
+    for point in (old.condyle_l, old.condyle_r):
+        near = np.argsort(np.linalg.norm(source - point, axis=1), kind="stable")[:16]
+        weight = 1 / (1.0 + np.linalg.norm(source[near] - point, axis=1))
+        condyles.append(point + weight @ (target[near] - source[near]) / weight.sum())
+    return replace(
+        old,
+        condyle_l=condyles[0],
+        condyle_r=condyles[1],
+        incisor=mouth(old.incisor[None])[0],
+        slide_max=old.slide_max * scale,
+        side_max=old.side_max * scale,
+        forward_max=old.forward_max * scale,
+    )

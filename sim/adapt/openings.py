@@ -1,0 +1,139 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The rims of mouth, eyes and nostrils: what a scanner sees worst and an eye sees first.
+
+Data beside a rim jumps to what lies behind it (eyeball, teeth, shadow), so rims do not look for data: they follow the
+skin around them smoothly, hold on to the landmarks, and the lips, or closed lids, hold on to each other.
+"""
+
+import numpy as np
+from scipy.sparse import coo_matrix, csr_matrix
+
+from ..anatomy.head import Head
+from ..mesh import edges
+from .fine_fit import Anchors
+
+TOGETHER = 3.0  # weight of a pair of rim points, against 1 for a point of data
+CLOSED = 0.3  # opening of the lids against the reference's below which an eye counts as closed
+CREASE = 0.25  # mm between the margins of closed lids
+
+
+def rims(reference: Head) -> np.ndarray:
+    """(n,) bool: skin vertices seen from outside with a neighbour that is not (lips, lids, nostrils)."""
+    inner = np.asarray(reference.groups["inner"]) > 0.5
+    a, b = edges(reference.skin.faces).T
+    out = np.zeros(len(inner), dtype=bool)
+    out[a[~inner[a] & inner[b]]] = True
+    out[b[~inner[b] & inner[a]]] = True
+    return out
+
+
+def _rim_of(reference: Head, rim, name):
+    return np.flatnonzero(rim & (np.asarray(reference.groups[name]) > 0.5))
+
+
+def lip_pairs(reference: Head, rim) -> np.ndarray:
+    """(k, 2) vertices of the upper and lower lip's rim that lie on each other on the reference."""
+    v = reference.skin.vertices
+    upper, lower = (_rim_of(reference, rim, f"lip_{x}") for x in ("upper", "lower"))
+    if len(upper) == 0 or len(lower) == 0:
+        return np.zeros((0, 2), dtype=int)
+    gap = np.linalg.norm(v[upper][:, None] - v[lower][None], axis=2)
+    pairs = np.concatenate(
+        [np.stack([upper, lower[gap.argmin(axis=1)]], axis=1), np.stack([upper[gap.argmin(axis=0)], lower], axis=1)]
+    )
+    return np.unique(pairs, axis=0)
+
+
+def lip_linings(reference: Head, gap: float = 3.0) -> np.ndarray:
+    """(k, 2) vertices behind the rims of upper and lower lip that face each other within ``gap`` mm."""
+    v = reference.skin.vertices
+    inner = np.asarray(reference.groups["inner"]) > 0.5
+    upper, lower = (
+        np.flatnonzero(inner & (np.asarray(reference.groups[f"lip_{x}"]) > 0.3)) for x in ("upper", "lower")
+    )
+    if len(upper) == 0 or len(lower) == 0:
+        return np.zeros((0, 2), dtype=int)
+    between = np.linalg.norm(v[upper][:, None] - v[lower][None], axis=2)
+    pairs = np.stack([upper, lower[between.argmin(axis=1)]], axis=1)
+    return pairs[between.min(axis=1) < gap]
+
+
+def lid_pairs(reference: Head, rim, side: str):
+    """Vertices of the upper lid's margin, and between which two of the lower one each comes to lie when closed.
+
+    Returns upper (k,), lower (k, 2), share (k,): the place is ``(1 - share) lower[0] + share lower[1]``.
+    """
+    v, marks = reference.skin.vertices, reference.landmark_positions()
+    upper, lower = (_rim_of(reference, rim, f"lid_{x}_{side}") for x in ("upper", "lower"))
+    if len(upper) == 0 or len(lower) < 2:
+        return np.zeros(0, int), np.zeros((0, 2), int), np.zeros(0)
+    axis = marks[f"ex_{side}"] - marks[f"en_{side}"]
+    length = np.linalg.norm(axis)
+
+    def along(rows):
+        return (v[rows] - marks[f"en_{side}"]) @ axis / length
+
+    lower = lower[np.argsort(along(lower), kind="stable")]
+    place, base = along(upper), along(lower)
+    after = np.clip(np.searchsorted(base, place), 1, len(lower) - 1)
+    step = base[after] - base[after - 1]
+    share = np.clip((place - base[after - 1]) / np.where(step > 1e-9, step, 1), 0, 1)
+    return upper, np.stack([lower[after - 1], lower[after]], axis=1), share
+
+
+def closed_eyes(reference: Head, landmarks, given) -> list[str]:
+    """Sides whose lids the landmarks put together: ``ps`` and ``pi`` were both given and nearly meet."""
+    rest = reference.landmark_positions()
+    out = []
+    for side in ("l", "r"):
+        names = [f"{x}_{side}" for x in ("ps", "pi", "en", "ex")]
+        if all(n in given for n in names[:2]) and all(n in rest for n in names):
+
+            def opening(p, names=names):
+                return np.linalg.norm(p[names[0]] - p[names[1]]) / np.linalg.norm(p[names[2]] - p[names[3]])
+
+            if opening(landmarks) < CLOSED * opening(rest):
+                out.append(side)
+    return out
+
+
+def rim_anchors(reference: Head, rim, matrix, closed) -> Anchors:
+    """Pairs of rim points as rows of the last stage's system; targets are positions, so rows are differences.
+
+    matrix (3, 3) turns and scales the reference's offsets into the scan's place; closed: sides of closed eyes.
+    """
+    v = reference.skin.vertices
+    n = len(v)
+    lips = lip_pairs(reference, rim)
+    data, row, column, target = [], [], [], []
+    count = 0
+
+    def add(plus, minus, share, offset):
+        nonlocal count
+        k = len(plus)
+        rows = count + np.arange(k)
+        for at, value in ((plus, np.ones(k)), (minus[:, 0], share - 1), (minus[:, 1], -share)):
+            data.append(value)
+            row.append(rows)
+            column.append(at)
+        target.append(offset)
+        count += k
+
+    inside = lip_linings(reference)
+    lips = np.unique(np.concatenate([lips, inside]), axis=0)
+    if len(lips):
+        add(
+            lips[:, 0],
+            np.repeat(lips[:, 1:], 2, axis=1),
+            np.zeros(len(lips)),
+            (v[lips[:, 0]] - v[lips[:, 1]]) @ matrix.T,
+        )
+    up = matrix[:, 2] / np.linalg.norm(matrix[:, 2])
+    for side in closed:
+        upper, lower, share = lid_pairs(reference, rim, side)
+        add(upper, lower, share, np.tile(CREASE * up, (len(upper), 1)))
+    if not count:
+        return Anchors(csr_matrix((0, n)), np.zeros((0, 3)), np.zeros(0))
+    place = (np.concatenate(row), np.concatenate(column))
+    sampling = coo_matrix((np.concatenate(data), place), shape=(count, n)).tocsr()
+    return Anchors(sampling, np.concatenate(target), np.full(count, TOGETHER))
