@@ -176,7 +176,7 @@ def _open(options):
     _start_blender()
     import bpy
 
-    from . import pipeline
+    from . import heads
     from .quiet import quiet
 
     path = Path(options.head).resolve()
@@ -187,7 +187,7 @@ def _open(options):
             raise InputError(
                 f"{options.head} is not a .blend file that can be opened: build the head again."
             ) from error
-    return pipeline.only_head(name=options.name)
+    return heads.only_head(name=options.name)
 
 
 def _save(path: Path) -> None:

@@ -102,6 +102,26 @@ def find_heads(scene: bpy.types.Scene | None = None) -> list[bpy.types.Object]:
     return sorted(filter(is_skin, (scene or bpy.context.scene).objects), key=lambda obj: obj.name)
 
 
+def only_head(scene: bpy.types.Scene | None = None, name: str | None = None) -> bpy.types.Object:
+    """The skin of the scene's head; ``name`` chooses among several.
+
+    Raises
+    ------
+    InputError : there is none, several, or none of that name.
+    """
+    found = find_heads(scene)
+    names = [head_name(skin) for skin in found]
+    if name is not None:
+        found = [skin for skin, known in zip(found, names, strict=True) if known == name]
+        if not found:
+            raise InputError(f"There is no head {name!r} in the file (there is {', '.join(names) or 'none'}).")
+    if not found:
+        raise InputError("There is no head in the file: build one from a scan first.")
+    if len(found) > 1:
+        raise InputError(f"The file holds several heads ({', '.join(names)}): choose one with --head.")
+    return found[0]
+
+
 def skin_of(obj) -> bpy.types.Object | None:
     """The skin object of the head that an object belongs to, or None."""
     while obj is not None and not is_skin(obj):

@@ -8,7 +8,6 @@ import numpy as np
 
 from ..sim.adapt.build import build_head
 from ..sim.anatomy.storage import load_head
-from ..sim.errors import InputError
 from ..sim.mesh import Mesh
 from ..sim.progress import Progress, Work, portion
 from ..sim.scan.clean import clean_scan
@@ -116,23 +115,3 @@ def build(
         skin = next(obj for obj in collection.objects if heads.is_skin(obj))
     heads.write_report(skin, report)
     return skin, report
-
-
-def only_head(scene: bpy.types.Scene | None = None, name: str | None = None) -> bpy.types.Object:
-    """The skin of the scene's head; ``name`` chooses among several.
-
-    Raises
-    ------
-    InputError : there is none, several, or none of that name.
-    """
-    found = heads.find_heads(scene)
-    names = [heads.head_name(skin) for skin in found]
-    if name is not None:
-        found = [skin for skin, known in zip(found, names, strict=True) if known == name]
-        if not found:
-            raise InputError(f"There is no head {name!r} in the file (there is {', '.join(names) or 'none'}).")
-    if not found:
-        raise InputError("There is no head in the file: build one from a scan first.")
-    if len(found) > 1:
-        raise InputError(f"The file holds several heads ({', '.join(names)}): choose one with --head.")
-    return found[0]
