@@ -16,7 +16,7 @@ from .structures import Control, Model
 
 
 def calibrated(model: Model, table: dict) -> Model:
-    """``model`` with `MuscleField.strength` set; a muscle that touches no skin gets none. ``table``: `model.strengths`."""
+    """``model`` with `MuscleField.strength` set, after ``table`` (`model.strengths`); none where no skin is touched."""
     m = model.muscles
     n = model.count
     active = np.unique(m.owner)

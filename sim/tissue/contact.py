@@ -89,7 +89,7 @@ def eye_planes(lids, positions: np.ndarray, gaze: np.ndarray) -> Planes:
 
 
 def sheet_contacts(surfaces: Surfaces, positions) -> Planes:
-    """Mouth bag and outer skin back to back: the outer one stays outside by a third of what lies between them at rest."""
+    """Mouth bag and outer skin back to back: the outer one stays outside by a third of their gap at rest."""
     inner, outer = surfaces.sheets[:, 0], surfaces.sheets[:, 1]
     normal = vertex_normals(positions, surfaces.triangles)[outer]
     return Planes(outer, normal, 0.35 * surfaces.sheet_gap, inner)

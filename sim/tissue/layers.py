@@ -19,8 +19,8 @@ from .structures import Layers
 #: sheet. Later rows win where groups overlap.
 _SOFT = {
     "mouth_bag": (1.2, 0.8, 0.3, 0.15),
-    "lip_upper": (2.2, 0.05, 0.05, 0.7),
-    "lip_lower": (2.2, 0.05, 0.05, 0.7),
+    "lip_upper": (2.2, 0.4, 0.1, 0.45),
+    "lip_lower": (2.2, 0.25, 0.1, 0.45),
     "lid_upper": (0.9, 0.3, 0.2, 0.06),
     "lid_lower": (0.9, 0.3, 0.2, 0.12),
     "nostril": (1.2, 1.2, 0.6, 1.0),
@@ -70,6 +70,10 @@ def build_layers(head: Head, parameters: Parameters) -> Layers:
         pairs = ((depth, d), (hold, h), (layer, m), (sheet, e))
         depth, hold, layer, sheet = (x + w * (y - x) for x, y in pairs)
     inner = groups.get("inner", np.zeros(n))
+    lips = np.flatnonzero(np.maximum(_sides(groups, "lip_upper"), _sides(groups, "lip_lower")) > 0.5)
+    if len(lips):  # the vestibule behind the lips goes where they go; the depth of the mouth stays
+        deep = np.clip((cKDTree(v[lips]).query(v)[0] - 10) / 15, 0, 1)
+        hold = np.where(_sides(groups, "mouth_bag") > 0.5, 0.08 + deep * (hold - 0.08), hold)
     depth = np.where(inner > 0.5, np.minimum(depth, 1.2), depth)
     reach = (bone_distance < _REACH) & (bone_distance > 0.3) & (facing > 0.4) & (inner < 0.5)
     firm = smoothed((reach & (soft < 0.5)).astype(float) * (1 - soft), stiffness, area, 4.0)
@@ -120,6 +124,10 @@ def sheet_ties(head: Head, layers: Layers, reach: float = 9.0) -> np.ndarray:
     distance, near = distance.reshape(len(inside), -1), near.reshape(len(inside), -1)
     a = np.repeat(inside, near.shape[1])
     b = outer[near.ravel()]
-    opposed = np.einsum("ij,ij->i", normal[a], normal[b]) < -0.2
-    keep = opposed & (distance.ravel() < reach) & (distance.ravel() > 0.2)
+    across = fascia[b] - fascia[a]
+    across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-9)
+    # back to back through flesh, not face to face across the mouth or from one lip to the other
+    through = (np.einsum("ij,ij->i", across, normal[b]) > 0.4) & (np.einsum("ij,ij->i", across, normal[a]) < -0.4)
+    together = np.abs(layers.jaw[a] - layers.jaw[b]) < 0.3
+    keep = through & together & (distance.ravel() < reach)
     return np.stack([a[keep], b[keep]], axis=1)

@@ -4,14 +4,15 @@ about the axis from the inner to the outer corner. At closure 1 both margins mee
 """
 
 import numpy as np
+from scipy.interpolate import PchipInterpolator
 
 from ..anatomy.head import Eye, Head
+from ..mesh import edges
 from .layers import Layers
 from .structures import Lids
 
 #: Share of the opening that the lower lid covers in a blink (the upper lid does the rest).
 LOWER_SHARE = 0.12
-_BINS = 41
 
 
 def eye_profile(vertices: np.ndarray, eye: Eye) -> tuple[np.ndarray, np.ndarray]:
@@ -29,19 +30,17 @@ def eye_profile(vertices: np.ndarray, eye: Eye) -> tuple[np.ndarray, np.ndarray]
     return grid, np.minimum(out, 1.25 * eye.radius)
 
 
-def _curve(along, value, low, high, pick):
-    """The margin as a smooth function of the place along the lid: the extreme of each stretch, then a smooth fit."""
-    centres = np.linspace(low, high, 13)
-    width = (high - low) / 9
-    found = []
-    for c in centres:
-        near = np.abs(along - c) < width / 2
-        if near.any():
-            found.append((c, pick(value[near])))
-    if len(found) < 4:
-        return None
-    x, y = np.array(found).T
-    return np.polynomial.Polynomial.fit(x, y, min(4, len(found) - 1))
+def _margin(along, elevation, corners):
+    """The margin as a function of the place along the lid, through both corners (2, 2) of the eye."""
+    (a0, e0), (a1, e1) = corners
+    inside = (along > a0 + 0.3) & (along < a1 - 0.3)
+    order = np.argsort(along[inside])
+    x, y = along[inside][order], elevation[inside][order]
+    # vertices almost above each other become one
+    step = np.concatenate([[0], np.cumsum(np.diff(x) > 0.4)]).astype(int) if len(x) else np.zeros(0, int)
+    count = np.maximum(np.bincount(step), 1)
+    x, y = (np.bincount(step, values) / count for values in (x, y)) if len(x) else (x, y)
+    return PchipInterpolator(np.concatenate([[a0], x, [a1]]), np.concatenate([[e0], y, [e1]]))
 
 
 def build_lids(head: Head, layers: Layers, side: str) -> Lids | None:
@@ -72,20 +71,22 @@ def build_lids(head: Head, layers: Layers, side: str) -> Lids | None:
     upper = upper_group[column] >= lower_group[column]
     inner = np.asarray(head.groups.get("inner", np.zeros(len(v))), float)[column] > 0.5
     (a0, e0, _), (a1, e1, _) = place(en), place(ex)
-    strong = share[column] > 0.6
+    corners = (a0, e0), (a1, e1)
+    # the margin is where the outer lid ends and its back begins
+    back = np.asarray(head.groups.get("inner", np.zeros(len(v)))) > 0.5
+    pair = edges(head.skin.faces)
+    turn = np.unique(np.concatenate([pair[back[pair[:, 1]], 0], pair[back[pair[:, 0]], 1]]))
+    edge = np.isin(column, turn) & ~inner & (share[column] > 0.5)
     curves = []
-    for is_upper, pick, name in ((True, np.min, "ps"), (False, np.max, "pi")):
-        rows = strong & (upper == is_upper) & ~inner & (along > a0) & (along < a1)
-        curve = _curve(along[rows], elevation[rows], a0, a1, pick) if rows.any() else None
-        if curve is None:
-            middle = place(marks[f"{name}_{side}"]) if f"{name}_{side}" in marks else ((a0 + a1) / 2, (e0 + e1) / 2, 0)
-            x = np.array([a0, middle[0], a1])
-            curve = np.polynomial.Polynomial.fit(x, [e0, middle[1], e1], 2)
-        curves.append(curve)
+    for is_upper, name in ((True, "ps"), (False, "pi")):
+        rows = edge & (upper == is_upper)
+        if rows.sum() >= 3:
+            curves.append(_margin(along[rows], elevation[rows], corners))
+        else:
+            middle = place(marks[f"{name}_{side}"])
+            curves.append(_margin(np.array([middle[0]]), np.array([middle[1]]), corners))
     within = np.clip(along, a0, a1)
-    fade = np.clip(np.minimum(along - a0, a1 - along) / (0.12 * (a1 - a0)) + 0.35, 0, 1)
-    top, low = curves[0](within), curves[1](within)
-    opening = np.clip(top - low, 0, 1.2) * fade
+    opening = np.clip(curves[0](within) - curves[1](within), 0, 1.4)
     # weight: 1 at the margin, 0 where the lid's own group ends; the groups are taken as drawn, scaled to reach 1
     weight = np.clip(share[column] / max(np.percentile(share[column], 90), 1e-3), 0, 1)
     profile_angle, profile = eye_profile(head.parts[f"eye_{side}"].vertices, eye)
