@@ -7,9 +7,7 @@ Everything is placed from the head's own landmarks, so a scan in any pose is pho
 import contextlib
 import json
 import math
-import tempfile
 from dataclasses import dataclass
-from pathlib import Path
 
 import bpy
 import numpy as np
@@ -229,46 +227,3 @@ def set_stage(scene, skin_object, yaw: float = 12.0, pitch: float = 3.0, **rende
     aim_camera(scene, frame, yaw, pitch, aspect)
     scene.world = backdrop()
     return frame
-
-
-def read_png(path) -> np.ndarray:
-    """(height, width, 4) float32 0..1, display values, top row first."""
-    image = bpy.data.images.load(str(path), check_existing=False)
-    try:
-        image.colorspace_settings.name = "Non-Color"
-        width, height = image.size
-        pixels = np.empty(width * height * 4, dtype=np.float32)
-        image.pixels.foreach_get(pixels)
-    finally:
-        bpy.data.images.remove(image)
-    return pixels.reshape(height, width, 4)[::-1].copy()
-
-
-def write_png(path, pixels: np.ndarray) -> None:
-    """Write (height, width, 4) display values 0..1, top row first, as an 8-bit PNG."""
-    height, width = pixels.shape[:2]
-    image = bpy.data.images.new("Head Shop", width, height, alpha=True)
-    try:
-        image.pixels.foreach_set(np.ascontiguousarray(pixels[::-1], dtype=np.float32).ravel())
-        image.file_format = "PNG"
-        image.filepath_raw = str(path)
-        image.save()
-    finally:
-        bpy.data.images.remove(image)
-
-
-def render_image(scene) -> np.ndarray:
-    """Render one still of the scene: (height, width, 4) float32 0..1, display values, top row first."""
-    render = scene.render
-    if hasattr(render.image_settings, "media_type"):
-        render.image_settings.media_type = "IMAGE"
-    render.image_settings.file_format = "PNG"
-    render.image_settings.color_mode, render.image_settings.color_depth = "RGBA", "8"
-    before = render.filepath
-    with tempfile.TemporaryDirectory(prefix="headshop-") as folder:
-        render.filepath = str(Path(folder) / "still.png")
-        try:
-            bpy.ops.render.render(write_still=True, scene=scene.name)
-        finally:
-            path, render.filepath = render.filepath, before
-        return read_png(path)

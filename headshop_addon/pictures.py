@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Pictures as arrays: render one, read one, write one."""
+
+import tempfile
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from .quiet import quiet
+
+
+def read_picture(path) -> np.ndarray:
+    """(height, width, 4) float32 0..1, display values, top row first."""
+    image = bpy.data.images.load(str(path), check_existing=False)
+    try:
+        image.colorspace_settings.name = "Non-Color"
+        width, height = image.size
+        pixels = np.empty(width * height * 4, dtype=np.float32)
+        image.pixels.foreach_get(pixels)
+    finally:
+        bpy.data.images.remove(image)
+    return pixels.reshape(height, width, 4)[::-1].copy()
+
+
+def write_picture(path, pixels: np.ndarray) -> None:
+    """Write (height, width, 4) display values 0..1, top row first, as an 8-bit PNG."""
+    height, width = pixels.shape[:2]
+    image = bpy.data.images.new("Head Shop", width, height, alpha=True)
+    try:
+        image.pixels.foreach_set(np.ascontiguousarray(pixels[::-1], dtype=np.float32).ravel())
+        image.file_format = "PNG"
+        image.filepath_raw = str(path)
+        image.save()
+    finally:
+        bpy.data.images.remove(image)
+
+
+def render_to(scene, path) -> None:
+    """Render the scene's current frame into a PNG file; its output settings become PNG, 8 bits."""
+    settings = scene.render.image_settings
+    if hasattr(settings, "media_type"):  # since 5.0
+        settings.media_type = "IMAGE"
+    settings.file_format, settings.color_mode, settings.color_depth, settings.compression = "PNG", "RGB", "8", 15
+    scene.render.filepath = str(path)
+    with quiet():
+        bpy.ops.render.render(write_still=True, scene=scene.name)
+
+
+def render_picture(scene) -> np.ndarray:
+    """Render the scene's current frame: (height, width, 4) float32 0..1, display values, top row first."""
+    with tempfile.TemporaryDirectory(prefix="headshop-") as folder:
+        path = Path(folder) / "still.png"
+        render_to(scene, path)
+        return read_picture(path)
