@@ -42,7 +42,7 @@ def build(options) -> None:
         landmarks = scan.orientation.turn(landmarks)
         name = options.name or Path(options.scan).stem
         skin, report = _run(pipeline.build(scan, landmarks, name), options)
-        _dress(skin)
+        _set_stage(skin)
         _save(blend)
         _write_plain(skin, plain, outputs)
     if not options.quiet:
@@ -121,15 +121,14 @@ def export(options) -> None:
 
 def sample(options) -> None:
     """The embedded sample subject as plain files; needs no Blender."""
-    from ..sim.scan.sample import make_sample
-    from .sample_files import FILES, write_sample
+    from ..sim.scan.sample import SEED, make_sample, write_sample
 
+    files = ("scan.ply", "landmarks.json", "truth.ply")
     with Outputs() as outputs:
-        folder = outputs.folder(options.output, FILES)
-        subject = _run(make_sample(**({} if options.seed is None else {"seed": options.seed})), options)
-        write_sample(subject, folder)
+        folder = outputs.folder(options.output, files)
+        write_sample(_run(make_sample(SEED if options.seed is None else options.seed), options), folder)
     if not options.quiet:
-        print(f"{options.output}: {', '.join(FILES)}")
+        print(f"{options.output}: {', '.join(files)}")
 
 
 def _require_file(path, what: str) -> None:
@@ -204,15 +203,15 @@ def _run(work, options):
         return finish(work, show)
 
 
-def _dress(skin) -> None:
-    """Materials, lights and camera, so that the file opens as a picture."""
+def _set_stage(skin) -> None:
+    """Lights and a camera, so that the file opens as a picture."""
     import bpy
 
-    from .materials import dress_head
+    from .quiet import quiet
     from .stage import set_stage
 
-    dress_head(skin)
-    set_stage(bpy.context.scene, skin)
+    with quiet():
+        set_stage(bpy.context.scene, skin)
 
 
 def _plain_folder(outputs: Outputs, options):

@@ -13,6 +13,7 @@ from ..sim.progress import Progress, Work, portion
 from ..sim.scan.clean import clean_scan
 from ..sim.scan.orientation import Orientation, detect
 from . import bridge, heads
+from .materials import dress_head
 from .provenance import timed, versions
 from .scan_import import read_scan
 
@@ -106,12 +107,11 @@ def build(
         created = scan_object is None
         if created:
             scan_object = add_scan(scan, f"{name} Scan", scene)
-        collection = heads.create_head(
-            result.head, name, scan_object, scene=scene, attributes=getattr(result, "attributes", None)
-        )
+        collection = heads.create_head(result.head, name, scan_object, scene=scene, attributes=result.attributes)
         if created:  # it lives with its head
             (scene or bpy.context.scene).collection.objects.unlink(scan_object)
             scan_object.hide_viewport = True
         skin = next(obj for obj in collection.objects if heads.is_skin(obj))
+        dress_head(skin)
     heads.write_report(skin, report)
     return skin, report
