@@ -34,9 +34,10 @@ def test_what_is_written_is_read_again(tmp_path, encoding, kind):
 def test_polygons_become_fans_and_other_columns_are_passed_over(tmp_path):
     path = tmp_path / "a.ply"
     path.write_text(
-        "ply\r\nformat ascii 1.0\r\nobj_info Cyberware's\r\nelement vertex 5\r\nproperty double x\r\n"
-        "property double y\r\nproperty float confidence\r\nproperty double z\r\nelement face 2\r\nproperty uchar flag\r\n"
-        "property list uchar int vertex_index\r\nelement edge 1\r\nproperty int a\r\nproperty int b\r\nend_header\r\n"
+        "ply\r\nformat ascii 1.0\r\nelement vertex 5\r\nproperty double x\r\n"
+        "property double y\r\nproperty float confidence\r\nproperty double z\r\nelement face 2\r\n"
+        "property uchar flag\r\nproperty list uchar int vertex_index\r\n"
+        "element edge 1\r\nproperty int a\r\nproperty int b\r\nend_header\r\n"
         "0 0 9 0\r\n1 0 9 0\r\n2 1 9 0\r\n1 2 9 5\r\n0 1 9 0\r\n7 5 0 1 2 3 4\r\n7 3 0 1 2\r\n0 1\r\n"
     )
     mesh = read_ply(path)

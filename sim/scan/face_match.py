@@ -5,16 +5,30 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..anatomy.head import Head
+from ..mesh import Mesh
 
 #: Points of the template in the first and in the last rounds.
-FEW, MANY = 220, 700
+FEW, MANY = 140, 450
 #: Part of the template that must find the scan: the rest may lie over holes.
 TRIM = 0.8
+#: Cells along the scan's largest extent in the first and in the last rounds.
+COARSE, FINE = 48, 120
 #: A head may be this much smaller or larger than the reference.
 SMALLEST, LARGEST = 0.72, 1.22
 
 
-def thinned(points: np.ndarray, cells: int = 48) -> np.ndarray:
+def surface_samples(mesh: Mesh) -> np.ndarray:
+    """Vertices of the faces and, of a coarse mesh, the middles of faces and their sides (k, 3); NaN left out."""
+    triangles = mesh.triangles
+    triangles = triangles[np.isfinite(mesh.vertices).all(axis=1)[triangles].all(axis=1)]
+    out = [mesh.vertices[np.unique(triangles)]]
+    if len(triangles) < 60_000:
+        a, b, c = (mesh.vertices[triangles[:, k]] for k in range(3))
+        out += [(a + b + c) / 3, (a + b) / 2, (b + c) / 2, (c + a) / 2]
+    return np.concatenate(out)
+
+
+def thinned(points: np.ndarray, cells: int = COARSE) -> np.ndarray:
     """One point (the mean) per occupied cell, ``cells`` along the largest extent: even density whatever the mesh."""
     low = points.min(axis=0)
     size = max(np.ptp(points, axis=0).max() / cells, 1e-12)
@@ -34,20 +48,23 @@ def face_template(head: Head) -> np.ndarray:
 def best_turns(points: np.ndarray, template: np.ndarray, turns: list[np.ndarray]) -> list[tuple[float, np.ndarray]]:
     """(misfit in mm, turn) of the best placement of the face near each of ``turns``, best first.
 
-    points (n, 3) mm : the scan in its own axes; template (k, 3) mm : +Z up, face toward -Y; turns : rotations (3, 3)
-    from the scan's axes to the template's. The misfit is the trimmed mean distance, on a head of reference size.
+    points (n, 3) mm : samples of the scan's surface, in its own axes; template (k, 3) mm : +Z up, face toward -Y;
+    turns : rotations (3, 3) from the scan's axes to the template's. The misfit is the trimmed mean distance, on a
+    head of reference size.
     """
+    fine = cKDTree(thinned(points, FINE))
+    points = thinned(points, COARSE)
     tree = cKDTree(points)
     few = template[_order(template, FEW)]
     start_turn, start_shift, of = _starts(points, template, few, turns)
-    placed = _align(tree, few, start_turn, start_shift, rounds=12)
+    placed = _align(tree, few, start_turn, start_shift, rounds=10)
     best = np.argsort(placed[-1])
     chosen = {}
     for k in best:  # the two best of each turn go on
         chosen.setdefault(of[k], []).append(k)
     go_on = np.array([k for group in chosen.values() for k in group[:2]])
-    go_on = go_on[np.argsort(placed[-1][go_on])][:16]
-    scale, turn, shift, misfit = _align(tree, template, placed[1][go_on], placed[2][go_on], 15, placed[0][go_on])
+    go_on = go_on[np.argsort(placed[-1][go_on])][:8]
+    scale, turn, shift, misfit = _align(fine, template, placed[1][go_on], placed[2][go_on], 12, placed[0][go_on])
     out = {}
     for k in np.argsort(misfit):
         # where it ended up may be nearer to another of the turns than to the one it began with

@@ -49,7 +49,8 @@ def draw_field(landmarks: dict[str, np.ndarray], rng: np.random.Generator, stren
     points, functionals, deviations, of = _functionals(landmarks)
     draws = np.sqrt(1 - SIZE_SHARE) * rng.standard_normal(of.max() + 1) + np.sqrt(SIZE_SHARE) * rng.standard_normal()
     target = strength * np.clip(draws, -2.2, 2.2)[of] * deviations  # beyond, people look odd
-    gram = np.einsum("apk,pq,bqk->ab", functionals, _kernel(points, points), functionals)
+    kernel = _kernel(points, points)
+    gram = sum(functionals[:, :, k] @ kernel @ functionals[:, :, k].T for k in range(3))
     weights = np.linalg.solve(gram + SLACK**2 * np.diag(np.diag(gram)), target)
     positions = np.array(list(landmarks.values()))
     patches = positions[rng.choice(len(positions), 14, replace=False)]

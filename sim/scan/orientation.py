@@ -9,7 +9,7 @@ from ..anatomy.head import Head
 from ..anatomy.storage import load_head
 from ..errors import InputError
 from ..mesh import Mesh
-from .face_match import best_turns, face_template, thinned
+from .face_match import best_turns, face_template, surface_samples
 
 #: Unit -> mm.
 UNITS = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
@@ -20,7 +20,7 @@ PLAUSIBLE = (90.0, 900.0)
 AXES = {sign + name: s * np.eye(3)[k] for k, name in enumerate("XYZ") for sign, s in (("+", 1.0), ("-", -1.0))}
 
 #: A second orientation that fits this much worse is no rival; a worse fit than this (mm) is no face.
-RIVAL, POOR = 1.25, 6.0
+RIVAL, POOR = 1.25, 4.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +85,7 @@ def detect(
     """
     reference = reference or load_head()
     allowed = _allowed(up, front)
-    points = thinned(mesh.vertices[np.isfinite(mesh.vertices).all(axis=1)])
+    points = surface_samples(mesh)
     units = _units(points, unit)
     if landmarks is not None:
         turn, spread = _turn_of_landmarks(landmarks, reference.landmark_positions())

@@ -53,14 +53,24 @@ class Sample:
     surface: Mesh
 
 
-def make_sample(seed: int = SEED, *, reference: Head | None = None, scanner: VirtualScanner | None = None) -> Work:
-    """Work that returns the `Sample` of ``seed``; ``scanner`` may set up the device differently."""
+def make_sample(
+    seed: int = SEED,
+    *,
+    reference: Head | None = None,
+    scanner: VirtualScanner | None = None,
+    levels: int = LEVELS,
+) -> Work:
+    """Work that returns the `Sample` of ``seed``.
+
+    reference : the head to vary, by default the one in ``assets``; scanner : the device, set up differently;
+    levels : of subdivision of the truth, fewer for a quick and coarse one
+    """
     rng = np.random.default_rng([seed, 0x5EED])
     yield Progress(0.0, "Making a person")
     reference = reference or load_head()
     person = individual(reference, rng)
     yield Progress(0.1, "Smoothing the skin")
-    person, surface, normals, inner = _smooth(person, reference, rng)
+    person, surface, normals, inner = _smooth(person, reference, levels, rng)
     complexion = Complexion.draw(rng)
     yield Progress(0.3, "Painting the skin")
     landmarks = _on_surface(person.landmark_positions(), surface)
@@ -106,10 +116,10 @@ def write_sample(sample: Sample, directory) -> list[Path]:
     return paths
 
 
-def _smooth(person, reference, rng):
+def _smooth(person, reference, levels, rng):
     """The head with its skin on a smooth surface, that surface, its normals and how much its vertices lie inside."""
     faces, n = person.skin.faces, len(person.skin.vertices)
-    operator, quads, _ = subdivision(faces, n, LEVELS)
+    operator, quads, _ = subdivision(faces, n, levels)
     operator = (limit(quads, operator.shape[0]) @ operator).tocsr()
     # the limit surface shrinks from its cage: push the cage out until its limit passes the person's own vertices
     cage = person.skin.vertices.copy()

@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Units and axes: found from the face, decided by landmarks, overridden by the artist, never silently wrong."""
+
+import numpy as np
+import pytest
+from headshop.sim.errors import InputError
+from headshop.sim.mesh import Mesh
+from headshop.sim.scan.orientation import UNITS, detect, rotations
+from headshop.sim.scan.ply import read_ply
+
+
+@pytest.fixture(scope="module")
+def skin(reference):
+    """The reference's skin without what no scanner sees, a little tilted, as another person of smaller size."""
+    seen = (reference.groups["inner"][reference.skin.triangles] < 0.5).all(axis=1)
+    tilt = np.linalg.qr(np.eye(3) + 0.12 * np.array([[0, 1, -0.6], [-1, 0, 0.5], [0.6, -0.5, 0]]))[0]
+    tilt *= np.sign(np.diag(tilt))
+    return Mesh.from_triangles(0.93 * reference.skin.vertices @ tilt.T + [30, -20, 400], reference.skin.triangles[seen])
+
+
+def _in(mesh, unit, turn):
+    """The mesh as a file in another unit and with other axes would hold it."""
+    return mesh.moved(mesh.vertices @ turn / UNITS[unit])
+
+
+def test_there_are_24_rotations():
+    turns = rotations()
+    assert len({tuple(np.rint(t).astype(int).ravel()) for t in turns}) == 24
+    np.testing.assert_allclose([np.linalg.det(t) for t in turns], 1)
+    np.testing.assert_array_equal(turns[0], np.eye(3))
+
+
+@pytest.mark.parametrize(
+    ("unit", "number", "names"), [("mm", 0, ("+Z", "-Y")), ("m", 4, ("+Y", "+Z")), ("in", 9, None), ("cm", 23, None)]
+)
+def test_a_head_is_recognised_in_any_unit_and_position(skin, unit, number, names):
+    turn = rotations()[number]
+    scan = _in(skin, unit, turn)
+    found = detect(scan)
+    assert found.certain and found.unit == unit and found.unit_scale == UNITS[unit]
+    np.testing.assert_allclose(found.apply(scan.vertices), skin.vertices, atol=1e-9)
+    np.testing.assert_allclose(found.inverse(found.apply(scan.vertices)), scan.vertices, atol=1e-9)
+    homogeneous = np.column_stack([scan.vertices, np.ones(len(scan.vertices))])
+    np.testing.assert_allclose((homogeneous @ found.matrix.T)[:, :3], skin.vertices, atol=1e-9)
+    if names:
+        assert (found.up, found.front) == names and found.up in found.reason and found.front in found.reason
+
+
+@pytest.mark.parametrize("number", [4, 17])
+def test_landmarks_decide(reference, skin, number):
+    turn = rotations()[number]
+    positions = reference.landmark_positions()
+    near = {n: positions[n] * 0.93 + [30, -20, 400] for n in ("prn", "ex_l", "ex_r", "gn", "t_l")}
+    scan = _in(skin, "m", turn)
+    found = detect(scan, {n: p @ turn for n, p in near.items()})
+    assert found.certain and found.unit == "m" and "landmarks" in found.reason
+    np.testing.assert_array_equal(found.rotation, turn)
+    np.testing.assert_allclose(found.turn({n: p @ turn for n, p in near.items()})["gn"], near["gn"])
+
+
+def test_the_landmarks_are_believed_even_against_the_shape(reference, skin):
+    positions = reference.landmark_positions()
+    over = np.diag([-1.0, 1, -1])  # landmarks of a head standing on its crown
+    found = detect(skin, {n: p @ over for n, p in positions.items()})
+    assert (found.up, found.front) == ("-Z", "-Y")
+
+
+def test_what_is_told_is_not_questioned(skin):
+    told = detect(skin, unit="cm", up="y", front="-X")
+    assert (told.unit_scale, told.up, told.front, told.certain) == (10.0, "+Y", "-X", True)
+    assert "as told" in told.reason
+    scale = detect(skin, unit=0.5, up="+Z", front="-Y")
+    assert scale.unit == "custom" and scale.unit_scale == 0.5
+    half = detect(_in(skin, "mm", rotations()[4]), up="+Y")
+    assert (half.up, half.front, half.certain) == ("+Y", "+Z", True)
+
+
+def test_a_ball_is_no_face_and_it_says_so(reference):
+    points = np.random.default_rng(5).standard_normal((4000, 3))
+    points *= 100 / np.linalg.norm(points, axis=1, keepdims=True)
+    found = detect(Mesh.from_triangles(points, np.arange(3999).reshape(-1, 3)))
+    assert not found.certain and "unsure" in found.reason
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        ({"unit": "furlong"}, "is no unit"),
+        ({"unit": -3}, "is no unit"),
+        ({"up": "W"}, "is no axis"),
+        ({"up": "+Z", "front": "-Z"}, "two different axes"),
+    ],
+)
+def test_wrong_overrides(reference, skin, options, says):
+    with pytest.raises(InputError, match=says):
+        detect(skin, **options)
+
+
+def test_absurd_size(reference, skin):
+    with pytest.raises(InputError, match="no head in mm, cm, m or inches"):
+        detect(skin.moved(skin.vertices * 1e5))
+
+
+@pytest.mark.parametrize("name", ["lps_infinite", "menpo_james", "fran_cyberware", "rvcg_dummyhead"])
+def test_real_scans_saved_as_gltf(shared, reference, name):
+    mesh = read_ply(shared / "scans" / f"{name}.ply")
+    scan = _in(mesh, "m", rotations()[4])
+    found = detect(scan)
+    assert (found.unit, found.up, found.front, found.certain) == ("m", "+Y", "+Z", True)

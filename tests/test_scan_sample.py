@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The sample: a plausible person, exact truth, a scan as raw as real ones, the same bytes for the same seed."""
+
+import json
+
+import numpy as np
+import pytest
+from headshop.sim.adapt.landmarks import read_landmarks
+from headshop.sim.errors import InputError
+from headshop.sim.progress import finish
+from headshop.sim.scan.clean import clean_scan
+from headshop.sim.scan.individual import draw_field, individual
+from headshop.sim.scan.ply import read_ply
+from headshop.sim.scan.sample import make_sample, write_sample
+from headshop.sim.scan.scanner import VirtualScanner
+from scipy.spatial import cKDTree
+
+
+@pytest.fixture(scope="module")
+def sample(reference):
+    return finish(make_sample())
+
+
+def _span(landmarks, a, b):
+    return np.linalg.norm(np.asarray(landmarks[a]) - landmarks[b])
+
+
+def test_measurements_follow_the_draw(reference):
+    """Over many people the measurements vary by about the published deviations."""
+    landmarks = reference.landmark_positions()
+    names, at = list(landmarks), np.array(list(landmarks.values()))
+    people = []
+    for seed in range(60):
+        moved = at + draw_field(landmarks, np.random.default_rng(seed))(at)
+        people.append(dict(zip(names, moved, strict=True)))
+    for a, b, published in (("zy_l", "zy_r", 5.8), ("al_l", "al_r", 2.5), ("ch_l", "ch_r", 3.6), ("n", "sn", 3.8)):
+        found = np.std([_span(p, a, b) for p in people])
+        assert 0.55 * published < found < 1.3 * published, (a, b, found)
+
+
+def test_the_field_nowhere_folds(reference):
+    points = reference.skin.vertices
+    for seed in range(5):
+        field = draw_field(reference.landmark_positions(), np.random.default_rng(seed))
+        step = 0.01
+        slope = np.stack(
+            [(field(points + step * e) - field(points - step * e)) / (2 * step) for e in np.eye(3)], axis=2
+        )
+        assert np.linalg.det(np.eye(3) + slope).min() > 0.3
+
+
+def test_no_strength_is_the_reference_itself(reference):
+    same = individual(reference, np.random.default_rng(1), strength=0.0)
+    np.testing.assert_allclose(same.skin.vertices, reference.skin.vertices, atol=1e-9)
+    np.testing.assert_allclose(same.muscles[0].fibres, reference.muscles[0].fibres, atol=1e-9)
+
+
+def test_lids_stay_on_the_eyeballs(reference):
+    person = individual(reference, np.random.default_rng(3), strength=1.5)
+    for k in range(2):
+        before = np.linalg.norm(reference.skin.vertices - reference.eyes[k].centre, axis=1)
+        after = np.linalg.norm(person.skin.vertices - person.eyes[k].centre, axis=1)
+        near = before < reference.eyes[k].radius + 2
+        assert near.sum() > 20
+        np.testing.assert_allclose(after[near], before[near], atol=1e-6)
+        assert person.eyes[k].radius == reference.eyes[k].radius
+
+
+def test_the_person_differs_from_the_reference_like_people_do(reference, sample):
+    a, b = reference.skin.vertices, sample.truth.skin.vertices
+    a, b = a - a.mean(axis=0), b - b.mean(axis=0)
+    u, _, vt = np.linalg.svd(b.T @ a)
+    apart = np.linalg.norm(b - a @ (u @ np.diag([1, 1, np.sign(np.linalg.det(u @ vt))]) @ vt).T, axis=1)
+    face = reference.groups["face"] > 0.5
+    assert 1.0 < apart[face].mean() < 8.0
+
+
+def test_the_scan_is_raw(sample):
+    mesh, counts = clean_scan(sample.scan)
+    assert 70_000 < counts["triangles"] < 140_000
+    assert counts["components"] > 10  # sheets and specks
+    assert mesh.colour is not None and 0.15 < mesh.colour.mean() < 0.9
+    reach = cKDTree(mesh.vertices)
+    assert reach.query(sample.landmarks["op"])[0] > 10 and "op" in sample.not_in_scan  # no back of the head
+    assert "prn" not in sample.not_in_scan and "ex_l" not in sample.not_in_scan
+    throat = sample.landmarks["gn"] + [0, 14, -1]
+    assert reach.query(throat)[0] > 3  # a hole under the chin
+
+
+def test_the_scan_lies_about_the_truth(sample):
+    surface = cKDTree(np.concatenate([sample.surface.vertices, sample.truth.parts["eye_l"].vertices]))
+    distance = surface.query(sample.scan.vertices)[0]
+    assert np.median(distance) < 0.6 and np.percentile(distance, 90) < 1.2
+    assert 0.5 < distance.max() < 120  # specks
+
+
+def test_the_truth_is_exact(sample):
+    surface = sample.surface.vertices
+    n = len(sample.truth.skin.vertices)
+    np.testing.assert_array_equal(surface[:n], sample.truth.skin.vertices)
+    on_head = sample.truth.landmark_positions()
+    for name, point in sample.landmarks.items():
+        assert np.linalg.norm(point - on_head[name]) < 1.5, name
+    assert len(sample.landmarks) == 60 and sample.missing == ()
+
+
+def test_files(sample, tmp_path):
+    paths = write_sample(sample, tmp_path / "sample")
+    assert [p.name for p in paths] == ["scan.ply", "landmarks.json", "truth.ply"]
+    assert sorted(p.name for p in (tmp_path / "sample").iterdir()) == sorted(p.name for p in paths)
+    landmarks = read_landmarks(paths[1])
+    np.testing.assert_allclose(landmarks["prn"], sample.landmarks["prn"], atol=1e-3)
+    assert json.loads(paths[1].read_text())["units"] == "mm"
+    assert len(read_ply(paths[0]).triangles) == len(sample.scan.triangles)
+    assert len(read_ply(paths[2]).vertices) == len(sample.surface.vertices)
+
+
+def test_no_folder_can_be_made_in_a_file(sample, tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match="cannot be made"):
+        write_sample(sample, tmp_path / "file")
+
+
+def test_the_same_seed_gives_the_same_bytes(reference, sample, tmp_path):
+    coarse = VirtualScanner(pixel=4.0)
+    first, second = (finish(make_sample(7, reference=reference, scanner=coarse, levels=1)) for _ in range(2))
+    written = [write_sample(s, tmp_path / str(k)) for k, s in enumerate((first, second))]
+    for a, b in zip(*written, strict=True):
+        assert a.read_bytes() == b.read_bytes()
+    assert np.abs(first.truth.skin.vertices - sample.truth.skin.vertices).max() > 1
