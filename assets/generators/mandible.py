@@ -109,7 +109,7 @@ def make_mandible(skin: Mesh, groups: dict[str, np.ndarray], landmarks: dict[str
     return space.snapped(mesh, ("pg", "sl", "go_l", "go_r"), reach=12.0)
 
 
-def make_jaw(mandible: Mesh, skin: Mesh, groups: dict[str, np.ndarray], landmarks: dict[str, np.ndarray]) -> Jaw:
+def make_jaw(skin: Mesh, groups: dict[str, np.ndarray], landmarks: dict[str, np.ndarray]) -> Jaw:
     """The hinge through the condyles; the incisor point is refined once the teeth stand."""
     space = BoneSpace(skin, groups, landmarks)
     left = condyle_centre(space)

@@ -14,8 +14,17 @@ from .skull_nets import surface_nets
 #: Corners of the upper dental arch as seen from above: mm lateral of the midline, mm behind the incisors.
 ARCH = np.array([(0, 0), (8.5, 1.6), (16.5, 7.5), (21, 15), (24, 23), (26.5, 32), (28.5, 42), (29, 50)], float)
 
+#: From the outer corner of the eye to the side rim of the orbit, mm.
+RIM_SIDE = np.array([4.5, 11.0, 2.5])
+
 #: mm kept between the skull and the mandible.
 JOINT_GAP = 2.2
+
+
+def malar_centre(space: BoneSpace) -> np.ndarray:
+    """(3,) mm, the middle of the left cheekbone's body."""
+    rim = space.landmarks["ex_l"] + RIM_SIDE
+    return np.array([rim[0] - 1.5, rim[1] + 1.0, space.targets["or_l"][2] - 8.0])
 
 
 def skull_field(space: BoneSpace):
@@ -23,7 +32,7 @@ def skull_field(space: BoneSpace):
     at, skin = space.targets, space.landmarks
     g, n, rhi, ans, zy, po = (at[k] for k in ("g", "n", "rhi", "ans", "zy_l", "po_l"))
     into = {k: at[k] - space.normals[k] * 4.0 for k in ("os_l", "or_l", "zy_l", "g", "n", "rhi")}
-    rim_side = skin["ex_l"] + [4.5, 11.0, 2.5]
+    rim_side = skin["ex_l"] + RIM_SIDE
     eye = (skin["en_l"] + skin["ex_l"]) / 2
     middle = np.array([0.0, (g[1] + at["op"][1]) / 2, 0.36 * at["v"][2]])
     radii = np.array([at["eu_l"][0] + 3, (at["op"][1] - g[1]) / 2 + 4, at["v"][2] - middle[2] + 4])
@@ -37,7 +46,7 @@ def skull_field(space: BoneSpace):
     alveolar = (ridge[None] + rise * (top - ridge)[None]).reshape(-1, 3)
     ridges = plate(alveolar, np.full(len(alveolar), 4.8))
 
-    malar = np.array([rim_side[0] - 1.5, rim_side[1] + 1.0, at["or_l"][2] - 8.0])
+    malar = malar_centre(space)
     crest = np.array([alveolus[5, 0] + 2, alveolus[5, 1] - 2, at["pr"][2] + 10.0])
     jaw = mandible_field(space)
     jaw_box = np.array(mandible_box(space))
