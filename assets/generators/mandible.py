@@ -81,7 +81,9 @@ def mandible_field(space: BoneSpace):
         bone = sheets(p)
         head = ellipsoid(p, condyle, (9.5, 4.6, 5.0), axis)
         bone = join(bone, join(head, tube(p, [condyle + [-1, 0, -2], neck + [-1.5, -1, -7]], [5.2, 3.6]), 3), 4)
-        bone = join(bone, tube(p, [coronoid + [0, 0, 1.5], coronoid + [-0.5, 1.0, -9]], [2.4, 4.0], ((1, 0, 0), 1.2)), 4)
+        bone = join(
+            bone, tube(p, [coronoid + [0, 0, 1.5], coronoid + [-0.5, 1.0, -9]], [2.4, 4.0], ((1, 0, 0), 1.2)), 4
+        )
         chin = ellipsoid(p, pg + [0, 7.0, -2.0], (9.0, 8.0, 9.5))
         chin = join(chin, ellipsoid(p, [10.5, pg[1] + 9.5, gn[2] + 6.0], (6.0, 5.5, 5.0)), 6)
         bone = join(bone, chin, 6)

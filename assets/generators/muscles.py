@@ -10,7 +10,7 @@ from ...sim.anatomy.head import Eye, Jaw, Muscle
 from ...sim.anatomy.muscle_shape import Room, muscle_shape
 from ...sim.mesh import Mesh
 from .muscles_points import left_points, path, point
-from .muscles_room import Tissue
+from .muscles_room import Tissue, evened
 from .skull_depth import BoneSpace
 from .skull_field import curve
 
@@ -51,7 +51,7 @@ class _Maker:
         self.points = left_points(space, eye)
         self.skin, self.groups, self.eye = skin, groups, eye
         self.tissue = Tissue(space, bones, skin, np.asarray(groups["inner"]) > 0.5)
-        self.room = Room(skin, bones)
+        self.room = Room(skin, bones, np.asarray(groups["inner"]) > 0.5)
 
     def muscles(self, row):
         """One muscle, or the left and the right one."""
@@ -85,18 +85,20 @@ class _Maker:
         if text.startswith("arc"):
             return self._lip_arc(text, count)
         corners = path(text, self.points)
+        deep = row["depth"].split()
+        on_skin = deep[0] not in ("deep", "temple", "cheek")
+        if on_skin:
+            corners = self.tissue.foot(corners.reshape(-1, 3))[0].reshape(corners.shape)
         lines = np.stack([curve(side, POINTS) for side in corners])
         share = np.linspace(0, 1, count)[:, None, None]
         fibres = lines[0] * (1 - share) + lines[1] * share
-        deep = row["depth"].split()
-        if deep[0] in ("deep", "temple", "cheek"):
+        if not on_skin:
             return self._deep(fibres, row, deep[0]), None
         depth = np.interp(np.linspace(0, 1, POINTS), np.linspace(0, 1, len(deep)), [float(d) for d in deep])
-        placed = self.tissue.at_depth(fibres.reshape(-1, 3), np.tile(depth, count)).reshape(fibres.shape)
+        placed = self.tissue.laid(fibres, depth)
         if "m:modiolus" in text.split(">")[-1]:
             placed[:, -1] = self.points["m:modiolus"]
-        placed = _smoothed(placed, 3)
-        return self._within(placed, 0.4), None
+        return self._within(evened(placed, 2), 0.4), None
 
     def _deep(self, fibres, row, kind):
         """Muscles that follow bone, not skin: their paths are true in space, only kept out of the bone."""
@@ -108,7 +110,7 @@ class _Maker:
             inner = fibres[:, 1:-1]
             shape = inner.shape
             fibres[:, 1:-1] = self.tissue.out_of_bone(inner.reshape(-1, 3), clear).reshape(shape)
-            fibres = _smoothed(fibres, 2)
+            fibres = evened(fibres, 2)
         return self._within(fibres, 0.3)
 
     def _fan(self, fibres):
@@ -117,12 +119,16 @@ class _Maker:
         p = self.points
         front, rear = fibres[0, 0], fibres[-1, 0]
         high = (front + rear) / 2 + np.array([6.0, 0.0, 30.0])
-        origin = curve([front, front * 0.55 + high * 0.45 + [2, -4, 8], high, rear * 0.55 + high * 0.45 + [2, 6, 10], rear], count)
+        origin = curve(
+            [front, front * 0.55 + high * 0.45 + [2, -4, 8], high, rear * 0.55 + high * 0.45 + [2, 6, 10], rear], count
+        )
         gate = np.array([p["s:coronoid"] + [3.0, 0.0, 14.0], p["s:coronoid"] + [4.0, 10.0, 14.0]])
         share = np.linspace(0, 1, count)[:, None]
         gate = gate[:1] * (1 - share) + gate[1:] * share
         end = fibres[:, -1]
-        out = np.stack([curve([origin[k], (origin[k] + gate[k]) / 2 + [5, 0, 2], gate[k], end[k]], POINTS) for k in range(count)])
+        out = np.stack(
+            [curve([origin[k], (origin[k] + gate[k]) / 2 + [5, 0, 2], gate[k], end[k]], POINTS) for k in range(count)]
+        )
         foot, normal = self.tissue.foot(out[:, 0])
         deep = 0.9 * self.tissue.thickness(foot, normal, lining=False)
         out[:, 0] = foot - deep[:, None] * normal
@@ -155,7 +161,9 @@ class _Maker:
             z = np.where(s > 0, above * s, below * s)
             rings.append(np.stack([lid[0] + x, centre[1] - 6 + np.where(c > 0, 12 * c**2, 0), lid[2] + z], axis=1))
         rings = np.array(rings)
-        placed = self.tissue.at_depth(rings.reshape(-1, 3), np.full(rings.size // 3, depth)).reshape(rings.shape)
+        closed = np.concatenate([rings, rings[:, :2]], axis=1)
+        placed = self.tissue.laid(closed, np.full(closed.shape[1], depth))[:, 1:-1]
+        placed = np.roll(placed, 1, axis=1)
         placed = _smoothed_ring(placed, 2)
         return self._within(placed, 0.4), self.eye.centre + [0, -self.eye.radius, 0]
 
@@ -190,16 +198,14 @@ class _Maker:
         for share in np.linspace(0, 1, count):
             middle = first * (1 - share) + last * share
             rise = middle[2] - corner[2]
-            side = corner * 0.35 + middle * 0.65
-            side[0] = corner[0] * 0.52
-            side[2] = corner[2] + 0.95 * rise
-            near = corner + np.array([1.5 + 3.0 * share, 2.0, 0.55 * rise])
+            side = np.array([corner[0] * 0.5, corner[1] * 0.35 + middle[1] * 0.65, corner[2] + 0.97 * rise])
+            near = corner + np.array([0.5 + 3.5 * share, 2.0, 0.62 * rise])
             left = curve([middle, side, near, end], 9)
             fibres.append(np.concatenate([left[::-1] * [-1, 1, 1], left[1:]]))
         fibres = np.array(fibres)
-        placed = self.tissue.at_depth(fibres.reshape(-1, 3), np.full(fibres.size // 3, 0.55)).reshape(fibres.shape)
+        placed = self.tissue.laid(fibres, np.full(fibres.shape[1], 0.55))
         placed[:, 0], placed[:, -1] = end * [-1, 1, 1], end
-        placed = _smoothed(placed, 3)
+        placed = evened(placed, 2)
         placed = (placed + placed[:, ::-1] * [-1, 1, 1]) / 2
         return placed, self.points["k:sto"] + [0.0, 4.0, 0.0]
 
@@ -208,14 +214,6 @@ def _mirrored_middle(fibres, row):
     """The mirror image of a midline muscle, its fibres or its points in the matching order."""
     flipped = fibres * [-1, 1, 1]
     return flipped[:, ::-1] if row["kind"] == "sphincter" else flipped[::-1]
-
-
-def _smoothed(fibres, rounds):
-    """Fibres smoothed along their length, ends held."""
-    fibres = fibres.copy()
-    for _ in range(rounds):
-        fibres[:, 1:-1] = 0.5 * fibres[:, 1:-1] + 0.25 * (fibres[:, :-2] + fibres[:, 2:])
-    return fibres
 
 
 def _smoothed_ring(rings, rounds):

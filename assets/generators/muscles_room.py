@@ -24,15 +24,28 @@ class Tissue:
         self._lining = cKDTree(_sampled(skin.vertices, lining, 1.5)[0])
 
     def foot(self, points):
-        """(n, 3) place on the skin over each point, and the skin's (n, 3) smooth outward direction there."""
-        distance, near = self._skin.query(points, k=14)
-        weight = np.exp(-(((distance - distance[:, :1]) / 3.0) ** 2))[..., None]
+        """(n, 3) place on the skin nearest to each point, and the skin's (n, 3) smooth outward direction there."""
+        distance, near = self._skin.query(points, k=30)
+        weight = np.exp(-(((distance - distance[:, :1]) / 2.5) ** 2))[..., None]
         normal = (weight * self._skin_normal[near]).sum(axis=1)
         normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-        closest = self._skin.data[near[:, 0]]
-        # Stay over the point: slide along the skin's tangent plane.
-        away = points - closest
-        return points - (away * normal).sum(1, keepdims=True) * normal, normal
+        place = (weight * self._skin.data[near]).sum(axis=1) / weight.sum(axis=1)
+        away = points - place
+        height = (away * normal).sum(1, keepdims=True)
+        return points - height * normal, normal
+
+    def laid(self, lines, share):
+        """Fibres (f, p, 3) laid along the skin at ``share`` (p,) of the way from skin (0) to bone (1)."""
+        feet = lines
+        for _ in range(4):
+            feet = evened(self.foot(feet.reshape(-1, 3))[0].reshape(lines.shape), 1)
+        feet, normal = self.foot(feet.reshape(-1, 3))
+        deep = self.thickness(feet, normal).reshape(lines.shape[:2])
+        deep = evened(deep, 2, ends=False)
+        normal = evened(normal.reshape(lines.shape), 2, ends=False)
+        normal /= np.linalg.norm(normal, axis=2, keepdims=True)
+        deep = np.clip(deep * share, 1.2, None)
+        return evened(feet.reshape(lines.shape) - deep[..., None] * normal, 1)
 
     def thickness(self, foot, normal, lining=True):
         """(n,) mm from the skin inward to bone, or to the lining of mouth and nose."""
@@ -51,12 +64,6 @@ class Tissue:
         side = ((points - self._bone.data[near]) * self._bone_normal[near]).sum(1)
         return np.where(side < 0, distance, -distance)
 
-    def at_depth(self, points, share):
-        """(n, 3): each point moved along the skin's normal to a ``share`` of the way from skin (0) to bone (1)."""
-        foot, normal = self.foot(points)
-        deep = np.clip(share * self.thickness(foot, normal), 1.2, None)
-        return foot - deep[:, None] * normal
-
     def out_of_bone(self, points, clear):
         """(n, 3): points nearer than ``clear`` mm to bone, or inside it, moved out along the bone's normal."""
         for _ in range(4):
@@ -73,3 +80,18 @@ class Tissue:
         normal = self._skin_normal[near]
         height = ((self._skin.data[near] - points) * normal).sum(1)
         return points - np.maximum(clear - height, 0)[:, None] * normal
+
+
+def evened(values, rounds, ends=True):
+    """(f, p, ...) smoothed along the fibres and between them; ``ends``: the fibres' ends stay."""
+    values = values.copy()
+    for _ in range(rounds):
+        middle = 0.5 * values[:, 1:-1] + 0.25 * (values[:, :-2] + values[:, 2:])
+        if not ends:
+            values[:, 0] = 0.6 * values[:, 0] + 0.4 * values[:, 1]
+            values[:, -1] = 0.6 * values[:, -1] + 0.4 * values[:, -2]
+        values[:, 1:-1] = middle
+        if len(values) > 2:
+            inner = slice(None) if not ends else slice(1, -1)
+            values[1:-1, inner] = 0.5 * values[1:-1, inner] + 0.25 * (values[:-2, inner] + values[2:, inner])
+    return values

@@ -99,7 +99,9 @@ def skull_field(space: BoneSpace):
                     [7.5, 5.4, 4.8, 4.8, 5.2, 6.5], ((1, 0, 0), 1.35))  # fmt: skip
         bone = join(join(bone, cheek, 6), arch, 5)
         # Mastoid process behind the ear canal.
-        bone = join(bone, tube(p, [[po[0] - 4, po[1] + 16, po[2] + 2], [po[0] - 8, po[1] + 11, po[2] - 25]], [11, 5]), 7)
+        bone = join(
+            bone, tube(p, [[po[0] - 4, po[1] + 16, po[2] + 2], [po[0] - 8, po[1] + 11, po[2] - 25]], [11, 5]), 7
+        )
         # Orbit, nasal aperture, great foramen.
         depth = p[:, 1] - (eye[1] - 6)
         share = np.clip(depth / 48, -0.35, 0.93)[:, None]

@@ -145,5 +145,3 @@ def _without_ears(skin, ear):
     vertices = skin.vertices.copy()
     vertices[free] = splu(laplace[free][:, free].tocsc()).solve(-(laplace[free][:, fixed] @ vertices[fixed]))
     return vertices
-
-

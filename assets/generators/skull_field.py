@@ -83,6 +83,4 @@ def curve(corners, count, smooth=True):
     i = np.minimum(at.astype(int), len(corners) - 2)
     t = (at - i)[:, None]
     p0, p1, p2, p3 = (ends[i + k] for k in range(4))
-    return 0.5 * (
-        2 * p1 + (p2 - p0) * t + (2 * p0 - 5 * p1 + 4 * p2 - p3) * t**2 + (3 * p1 - p0 - 3 * p2 + p3) * t**3
-    )
+    return 0.5 * (2 * p1 + (p2 - p0) * t + (2 * p0 - 5 * p1 + 4 * p2 - p3) * t**2 + (3 * p1 - p0 - 3 * p2 + p3) * t**3)

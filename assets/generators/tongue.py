@@ -10,9 +10,7 @@ from .teeth import Mouth
 AROUND, ALONG = 16, 14
 
 
-def make_tongue(
-    skin: Mesh, groups: dict[str, np.ndarray], landmarks: dict[str, np.ndarray], teeth_lower: Mesh
-) -> Mesh:
+def make_tongue(skin: Mesh, groups: dict[str, np.ndarray], landmarks: dict[str, np.ndarray], teeth_lower: Mesh) -> Mesh:
     """The tongue's mesh, its tip behind the lower incisors, inside the teeth and the lining of the mouth."""
     mouth = Mouth(skin, groups, landmarks)
     gum = teeth_lower.vertices

@@ -13,8 +13,8 @@ from scipy.spatial import cKDTree
 from ..mesh import Mesh, vertex_normals
 from .head import Muscle
 
-#: Stations along a muscle and columns across its sheet; the same for all, so heads share connectivity.
-ALONG, ACROSS = 14, 6
+#: Stations along a muscle and around a ring, columns across its sheet: heads share connectivity.
+ALONG, AROUND, ACROSS = 14, 28, 6
 #: Share of the belly's thickness left at a tendon.
 TENDON = 0.22
 
@@ -22,28 +22,34 @@ TENDON = 0.22
 class Room:
     """The soft tissue between skin and bone.
 
-    skin, bones : meshes, mm; bones may be empty. Distances are to points sampled on them.
+    skin, bones : meshes, mm; bones may be empty. inner : (n,) bool, the skin's vertices that line mouth, nose and
+    lids (the group ``inner``). Distances are to points sampled on the surfaces.
     """
 
-    def __init__(self, skin: Mesh, bones: list[Mesh]):
-        self._skin = _Samples([skin])
-        self._bones = _Samples(bones) if bones else None
+    def __init__(self, skin: Mesh, bones: list[Mesh], inner: np.ndarray | None = None):
+        inner = np.zeros(len(skin.vertices), bool) if inner is None else np.asarray(inner, bool)
+        lining = inner[skin.triangles].all(axis=1)
+        self._skin = _Samples([(skin.vertices, skin.triangles[~lining])])
+        inside = [(mesh.vertices, mesh.triangles) for mesh in bones]
+        if lining.any():
+            inside.append((skin.vertices, skin.triangles[lining]))
+        self._inside = _Samples(inside) if inside else None
 
     def outward(self, points):
-        """(n, 3) unit direction to the skin's outside and (n,) mm of room to the skin and to the bone."""
+        """(n, 3) unit direction to the skin's outside, (n,) mm of room to the skin and to bone or lining."""
         normal, to_skin = self._skin.normal_and_distance(points)
-        to_bone = np.full(len(points), np.inf) if self._bones is None else self._bones.normal_and_distance(points)[1]
-        return normal, to_skin, to_bone
+        inside = np.full(len(points), np.inf) if self._inside is None else self._inside.normal_and_distance(points)[1]
+        return normal, to_skin, inside
 
 
 class _Samples:
     def __init__(self, meshes):
         points, normals = [], []
-        for mesh in meshes:
-            normal = vertex_normals(mesh.vertices, mesh.triangles)
-            corner = mesh.triangles
-            points += [mesh.vertices, mesh.vertices[corner].mean(axis=1)]
-            normals += [normal, normal[corner].mean(axis=1)]
+        for vertices, corner in meshes:
+            normal = vertex_normals(vertices, corner)
+            used = np.unique(corner)
+            points += [vertices[used], vertices[corner].mean(axis=1)]
+            normals += [normal[used], normal[corner].mean(axis=1)]
         self._tree = cKDTree(np.concatenate(points))
         self._normals = np.concatenate(normals)
 
@@ -52,7 +58,7 @@ class _Samples:
         weight = 1 / (distance + 1.0) ** 2
         normal = (weight[..., None] * self._normals[near]).sum(axis=1)
         normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-9)
-        return normal, np.abs(((points - self._tree.data[near[:, 0]]) * self._normals[near[:, 0]]).sum(axis=1))
+        return normal, distance[:, 0]
 
 
 def muscle_shape(fibres: np.ndarray, width: float, thickness: float, ring=False, room: Room | None = None) -> Mesh:
@@ -70,17 +76,20 @@ def muscle_shape(fibres: np.ndarray, width: float, thickness: float, ring=False,
     sheet = _resampled(fibres, ring)
     along = np.roll(sheet, -1, 1) - np.roll(sheet, 1, 1) if ring else np.gradient(sheet, axis=1)
     flat = sheet.reshape(-1, 3)
+    own = np.cross(along, np.gradient(sheet, axis=0)).reshape(-1, 3)
+    own /= np.maximum(np.linalg.norm(own, axis=1, keepdims=True), 1.0)
     if room is None:
-        normal = np.cross(along, _across(sheet)).reshape(-1, 3)
+        normal = own
         to_skin = to_bone = np.full(len(flat), np.inf)
     else:
         normal, to_skin, to_bone = room.outward(flat)
+        normal = 0.4 * normal + own * np.sign((own * normal).sum(1, keepdims=True))
     normal = normal - _share(normal, along.reshape(-1, 3))
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-9)
     normal = _steadied(normal.reshape(sheet.shape), ring)
     sheet = _spread(sheet, along, normal, width, ring)
 
-    belly = np.ones(ALONG) if ring else _belly(np.linspace(0, 1, ALONG))
+    belly = np.ones(AROUND) if ring else _belly(np.linspace(0, 1, ALONG))
     across = np.linspace(-1, 1, ACROSS)
     round_off = np.sqrt(np.maximum(1 - across**2, 0))
     half = 0.5 * thickness * belly[None] * round_off[:, None]
@@ -99,11 +108,11 @@ def reshaped(muscle: Muscle, fibres: np.ndarray, room: Room | None = None, centr
 
 
 def _resampled(fibres, ring):
-    """(ACROSS, ALONG, 3): the fibres at even stations, and even columns between the outermost."""
-    count, points = fibres.shape[:2]
+    """(ACROSS, ALONG or AROUND, 3): the fibres at even stations, and even columns between the outermost."""
+    count = len(fibres)
     if ring:
         fibres = np.concatenate([fibres, fibres[:, :1]], axis=1)
-    at = np.linspace(0, fibres.shape[1] - 1, ALONG + (1 if ring else 0))[: ALONG]
+    at = np.linspace(0, fibres.shape[1] - 1, AROUND + 1)[:-1] if ring else np.linspace(0, fibres.shape[1] - 1, ALONG)
     i = np.minimum(at.astype(int), fibres.shape[1] - 2)
     t = (at - i)[None, :, None]
     even = fibres[:, i] * (1 - t) + fibres[:, i + 1] * t
@@ -111,10 +120,6 @@ def _resampled(fibres, ring):
     i = np.minimum(at.astype(int), max(count - 2, 0))
     t = (at - i)[:, None, None]
     return even[i] * (1 - t) + even[np.minimum(i + 1, count - 1)] * t
-
-
-def _across(sheet):
-    return np.repeat((sheet[-1] - sheet[0])[None], len(sheet), axis=0)
 
 
 def _share(vectors, along):
@@ -134,20 +139,17 @@ def _steadied(normal, ring):
 
 
 def _spread(sheet, along, normal, width, ring):
-    """The sheet widened about its middle line where the fibres run closer than the belly is wide."""
-    middle = sheet.mean(axis=0)
-    side = np.cross(normal.mean(axis=0), along.mean(axis=0))
-    side /= np.maximum(np.linalg.norm(side, axis=1, keepdims=True), 1e-9)
-    span = sheet[-1] - sheet[0]
-    if (span * side).sum() < 0:
-        side = -side
+    """The sheet widened about its middle line where the fibres run closer than the muscle is wide there."""
     if ring:  # the fibres of a ring tell its width themselves
         return sheet
-    have = np.maximum((span * side).sum(axis=1), 0)
+    side = np.cross(normal.mean(axis=0), along.mean(axis=0))
+    side /= np.maximum(np.linalg.norm(side, axis=1, keepdims=True), 1e-9)
+    span = ((sheet[-1] - sheet[0]) * side).sum(axis=1)
+    if span.sum() < 0:
+        side, span = -side, -span
     want = width * (0.30 + 0.70 * _belly(np.linspace(0, 1, ALONG)))
-    lack = np.maximum(want - have, 0)
-    offset = np.linspace(-0.5, 0.5, ACROSS)[:, None, None] * (lack[:, None] * side)[None]
-    return np.where(np.isfinite(offset), sheet + offset, sheet) + 0 * middle
+    lack = np.maximum(want - np.maximum(span, 0), 0)
+    return sheet + np.linspace(-0.5, 0.5, ACROSS)[:, None, None] * (lack[:, None] * side)[None]
 
 
 def _belly(t):

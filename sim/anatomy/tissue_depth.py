@@ -47,9 +47,7 @@ def skin_counterparts(landmarks: dict[str, np.ndarray]) -> dict[str, np.ndarray]
     return {name: found[name] for name in SKULL if name in found}
 
 
-def tissue_vectors(
-    landmarks: dict[str, np.ndarray], skull_landmarks: dict[str, np.ndarray]
-) -> dict[str, np.ndarray]:
+def tissue_vectors(landmarks: dict[str, np.ndarray], skull_landmarks: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     """Skull landmark -> (3,) mm, the vector from the bone to the skin."""
     skin = skin_counterparts(landmarks)
     return {name: skin[name] - np.asarray(skull_landmarks[name], float) for name in skin if name in skull_landmarks}
@@ -71,4 +69,5 @@ def skull_targets(
     """
     skin = skin_counterparts(landmarks)
     factor = scale if isinstance(scale, dict) else dict.fromkeys(vectors, scale)
-    return {name: skin[name] - factor.get(name, 1.0) * np.asarray(v, float) for name, v in vectors.items() if name in skin}
+    known = {name: np.asarray(v, float) for name, v in vectors.items() if name in skin}
+    return {name: skin[name] - factor.get(name, 1.0) * v for name, v in known.items()}
