@@ -13,6 +13,8 @@ from .structures import Lids
 
 #: Share of the opening that the lower lid covers in a blink (the upper lid does the rest).
 LOWER_SHARE = 0.12
+#: Closed lids press on each other: rad beyond the first touch, against the rounding of their edges.
+_SEAL = 0.03
 
 
 def eye_profile(vertices: np.ndarray, eye: Eye) -> tuple[np.ndarray, np.ndarray]:
@@ -89,6 +91,8 @@ def build_lids(head: Head, layers: Layers, side: str) -> Lids | None:
     opening = np.clip(curves[0](within) - curves[1](within), 0, 1.4)
     # weight: 1 at the margin, 0 where the lid's own group ends; the groups are taken as drawn, scaled to reach 1
     weight = np.clip(share[column] / max(np.percentile(share[column], 90), 1e-3), 0, 1)
+    off = np.abs(elevation - np.where(upper, curves[0](within), curves[1](within)))
+    weight = np.maximum(weight, np.clip(1.4 - off / 0.25, 0, 1) * ((along > a0) & (along < a1)))
     profile_angle, profile = eye_profile(head.parts[f"eye_{side}"].vertices, eye)
     distance = np.linalg.norm(v - eye.centre, axis=1)
     touching = np.flatnonzero((distance < 1.6 * eye.radius) & layers.free[: len(v)])
@@ -145,13 +149,15 @@ def lid_targets(lids: Lids, upper: float, lower: float, gaze: np.ndarray) -> np.
     The upper lid follows a vertical gaze; the lower one follows a downward gaze by half.
     """
     follow = float(gaze[1])
-    turn_upper = -upper * (1 - LOWER_SHARE) * lids.opening + 0.55 * follow * np.minimum(lids.opening / 0.5, 1)
+    seal = _SEAL * np.clip(upper, 0, 1) ** 4 * (lids.opening > 0)
+    turn_upper = -upper * (1 - LOWER_SHARE) * lids.opening - seal + 0.55 * follow * np.minimum(lids.opening / 0.5, 1)
     turn_lower = lower * LOWER_SHARE * lids.opening + (0.3 * min(follow, 0) + 0.1 * max(follow, 0)) * np.minimum(
         lids.opening / 0.5, 1
     )
     # never past each other: the meeting line limits both
     closed = turn_lower - turn_upper
-    over = np.where(closed > lids.opening, lids.opening / np.maximum(closed, 1e-9), 1.0)
+    most = lids.opening + _SEAL
+    over = np.where(closed > most, most / np.maximum(closed, 1e-9), 1.0)
     angle = lids.elevation + lids.weight * np.where(lids.upper, turn_upper, turn_lower) * over
     frame = lids.along[:, None] * lids.axis
 
