@@ -40,10 +40,12 @@ def packed(mesh: Mesh, resolution: int = 2048, padding: int = 4) -> tuple[np.nda
     if len(out) != len(triangles) or not np.array_equal(origin[out], triangles):
         raise InputError("Some UV islands have no area and cannot be packed: unwrap the mesh anew.")
     placed = np.zeros((len(uv), 2), dtype=np.float32)
-    placed[triangles] = new[out]  # both triangles of a quad lie in one island, so shared corners agree
+    size = np.array([atlas.width, atlas.height], dtype=np.float32)
+    side = size.max()  # xatlas trims the square and stretches what is left to 0..1: undo that, or islands are distorted
+    placed[triangles] = new[out] * (size / side)  # both triangles of a quad lie in one island: shared corners agree
     result = np.zeros(mesh.uv.shape, dtype=np.float32)
     result[used] = placed[corner[used]]
-    return result, float(atlas.utilization)
+    return result, float(atlas.utilization * size.prod() / side**2)
 
 
 def repack(obj: bpy.types.Object, resolution: int = 2048) -> float:

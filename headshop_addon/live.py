@@ -15,11 +15,12 @@ import numpy as np
 from bpy.app.handlers import persistent
 
 from ..sim.errors import InputError
-from . import bridge, dependencies, heads, muscle_names
+from . import bridge, dependencies, heads, jobs, muscle_names
 
 KEY = "Live"
-#: Iterations for one look: enough to follow a slider, continued by the next one.
-ITERATIONS = 40
+#: Solver iterations for one look while a slider is dragged or the time line plays; a timer adds as many at a time
+#: until the face rests. Without a window the face is brought to rest at once.
+LOOK, REST = 10, 60
 STILL = 0.001  # mm: a part that never moved more needs no key
 
 _depth = 0  # > 0 while nothing must follow
@@ -34,6 +35,7 @@ class _Following:
     neutral: dict[str, np.ndarray]
     state: Any
     pose: tuple | None = None
+    settled: bool = True
 
 
 _following: dict[int, _Following] = {}
@@ -113,39 +115,63 @@ def follow(skin, depsgraph=None) -> None:
     values = sliders(skin, depsgraph)
     with paused():
         try:
-            _solve(skin, values)
+            following = _solve(skin, values, REST if bpy.app.background else LOOK)
         except InputError as error:
             print(f"Head Shop: {error}")
             _following.pop(skin.session_uid, None)
+            return
+    waiting = following is not None and not following.settled and not bpy.app.background
+    if waiting and not bpy.app.timers.is_registered(_settle):
+        bpy.app.timers.register(_settle, first_interval=0.05)
 
 
-def _solve(skin, values):
+def _settle():
+    """Timer: some more iterations for every face that is not at rest; nothing while a job runs or the time line plays."""
+    if jobs.running is not None or any(
+        window.screen.is_animation_playing for window in bpy.context.window_manager.windows
+    ):
+        return 0.3
+    for skin in heads.find_heads(bpy.context.scene):
+        if (following := _following.get(skin.session_uid)) is not None and not following.settled:
+            following.pose = None
+            follow(skin)
+    return 0.02 if any(not following.settled for following in _following.values()) else None
+
+
+def _solve(skin, values, iterations) -> _Following | None:
     from ..sim.acting.pose import control, pose_from
     from ..sim.tissue.posing import posed_parts
-    from ..sim.tissue.solver import solve
+    from ..sim.tissue.solver import rest_state, solve
 
-    following = _current(skin, bool(any(values.values())))
+    moving = any(values.values())
+    following = _current(skin, moving)
     pose = tuple(values.values())
     if following is None or following.pose == pose:
-        return
-    known = {*following.model.muscle_names, *muscle_names.CONTROLS}
-    wanted = control(following.model, pose_from({name: v for name, v in values.items() if name in known}))
-    solution = solve(following.model, wanted, following.state, max_iterations=ITERATIONS)
-    following.state, following.pose = solution.state, pose
+        return following
+    following.pose, following.settled = pose, True
+    if moving:
+        known = {*following.model.muscle_names, *muscle_names.CONTROLS}
+        wanted = control(following.model, pose_from({name: v for name, v in values.items() if name in known}))
+        solution = solve(following.model, wanted, following.state, max_iterations=iterations)
+        following.state, following.settled = solution.state, solution.converged or bpy.app.background
+        posed = posed_parts(following.model, solution.state, wanted)
+    else:  # rest is the scan itself, exactly
+        following.state, posed = rest_state(following.model), following.neutral
     objects = heads.parts_of(skin)
-    for part, vertices in posed_parts(following.model, solution.state, wanted).items():
+    for part, vertices in posed.items():
         _write(skin, objects[part], vertices - following.neutral[part])
+    return following
 
 
 def _current(skin, moving: bool) -> _Following | None:
     """The simulation of this head, made where there is none; a head at rest that never moved needs none."""
+    keys = skin.data.shape_keys
+    if not moving and (keys is None or KEY not in keys.key_blocks):
+        return None
     mark = fingerprint(skin)
     following = _following.get(skin.session_uid)
     if following is not None and following.fingerprint == mark:
         return following
-    keys = skin.data.shape_keys
-    if not moving and (keys is None or KEY not in keys.key_blocks):
-        return None
     from ..sim.acting.pose import Pose, control
     from ..sim.tissue.model import build_model
     from ..sim.tissue.posing import posed_parts
@@ -216,4 +242,6 @@ def unregister():
     """Stop following; heads keep the pose they are in."""
     for name, handler in _HANDLERS:
         getattr(bpy.app.handlers, name).remove(handler)
+    if bpy.app.timers.is_registered(_settle):
+        bpy.app.timers.unregister(_settle)
     _following.clear()

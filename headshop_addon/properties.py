@@ -17,6 +17,7 @@ from bpy.props import (
 )
 
 from . import heads, live, muscle_names
+from .class_registry import register_all, unregister_all
 
 #: How a landmark got its place.
 STATES = (
@@ -121,8 +122,7 @@ def register():
         name: _slider(label, description, lowest)
         for name, (label, lowest, description) in muscle_names.CONTROLS.items()
     }
-    for cls in _CLASSES:
-        bpy.utils.register_class(cls)
+    register_all(_CLASSES)
     bpy.types.Object.headshop = PointerProperty(type=HEADSHOP_PG_object, override={"LIBRARY_OVERRIDABLE"})
     bpy.types.Scene.headshop = PointerProperty(type=HEADSHOP_PG_scene)
 
@@ -131,5 +131,4 @@ def unregister():
     """Detach and forget; the values stay in the .blend and come back when the extension does."""
     del bpy.types.Scene.headshop
     del bpy.types.Object.headshop
-    for cls in reversed(_CLASSES):
-        bpy.utils.unregister_class(cls)
+    unregister_all(_CLASSES)

@@ -68,22 +68,27 @@ def follow(scan) -> None:
 
     With fewer than three placed, or where these lie on a line, there is nothing to follow: the others become missing.
     """
-    from ..sim.adapt.completion import complete_landmarks
-    from ..sim.anatomy.storage import load_head
-    from ..sim.errors import InputError
-
     given = positions(scan)
-    everything = {}
-    if len(given) >= ENOUGH_TO_FOLLOW:
-        try:
-            everything = complete_landmarks(load_head(), given)
-        except InputError:
-            everything = {}  # on a line: more clicks will cure it
+    everything = _completed(given) if len(given) >= ENOUGH_TO_FOLLOW and not _on_a_line(given) else {}
     for name, item in entries(scan).items():
         if item.state != "PLACED":
             item.state = "DERIVED" if name in everything else "MISSING"
             if name in everything:
                 item.co = np.asarray(everything[name]) * METRES
+
+
+def _completed(given: dict) -> dict:
+    from ..sim.adapt.completion import complete_landmarks
+    from ..sim.anatomy.storage import load_head
+
+    return complete_landmarks(load_head(), given)
+
+
+def _on_a_line(given: dict) -> bool:
+    """Whether the points leave open how the head is turned about a line (thinner than a twentieth of its length)."""
+    points = np.array(list(given.values()))
+    extent = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    return bool(extent[1] < 0.05 * extent[0])
 
 
 def snapshot(scan) -> tuple:

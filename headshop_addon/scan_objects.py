@@ -34,11 +34,12 @@ def import_scan(context, path, unit: str | None = None, up: str | None = None) -
 
 
 def add_sample(context, sample, with_landmarks: bool = True) -> bpy.types.Object:
-    """Put the sample subject's scan into the scene and choose it; returns the object."""
-    report = {"vertices": len(sample.scan.vertices), "triangles": len(sample.scan.triangles)}
-    obj = _add(context, pipeline.Scan(sample.scan, _upright(), report), "Sample")
+    """Put the sample subject's scan into the scene, cleaned like any other, and choose it; returns the object."""
+    scan = pipeline.prepare_scan(sample.scan, sample.landmarks)
+    obj = _add(context, scan, "Sample")
     if with_landmarks:
-        scan_landmarks.replace(obj, {name: p for name, p in sample.landmarks.items() if name in SKIN})
+        turned = scan.orientation.turn(sample.landmarks)
+        scan_landmarks.replace(obj, {name: p for name, p in turned.items() if name in SKIN})
     return obj
 
 

@@ -3,7 +3,7 @@
 
 from importlib import import_module
 
-from bpy.utils import register_class, unregister_class
+from ..headshop_addon.class_registry import register_all, unregister_all
 
 FILES = (
     *("import_scan", "make_sample", "choose_scan"),
@@ -22,11 +22,9 @@ def classes() -> list[type]:
 
 def register():
     """Register all operators."""
-    for cls in classes():
-        register_class(cls)
+    register_all(classes())
 
 
 def unregister():
-    """Unregister all operators, last first."""
-    for cls in reversed(classes()):
-        unregister_class(cls)
+    """Unregister all operators."""
+    unregister_all(classes())

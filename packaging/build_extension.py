@@ -103,7 +103,7 @@ def write_lock() -> None:
     print(f"{LOCK}: {len(wheels)} wheels")
 
 
-def stage(folder: Path, wheels: list[Path]) -> Path:
+def stage(folder: Path, wheels: list[Path], platforms=tuple(PLATFORMS)) -> Path:
     """A copy of the checkout in ``folder``, its manifest naming ``wheels`` if there are any.
 
     What git ignores is left behind, so environments and outputs never reach a zip; without git (a source archive) the
@@ -127,17 +127,17 @@ def stage(folder: Path, wheels: list[Path]) -> Path:
             shutil.copy(wheel, source / "wheels" / wheel.name)
         manifest = source / "blender_manifest.toml"
         names = ",\n".join(f'    "./wheels/{wheel.name}"' for wheel in wheels)
-        platforms = ", ".join(f'"{name}"' for name in PLATFORMS)
+        supported = ", ".join(f'"{name}"' for name in platforms)
         head, separator, tail = manifest.read_text().partition("\n[permissions]")
-        manifest.write_text(f"{head}\nplatforms = [{platforms}]\nwheels = [\n{names},\n]\n{separator}{tail}")
+        manifest.write_text(f"{head}\nplatforms = [{supported}]\nwheels = [\n{names},\n]\n{separator}{tail}")
     return source
 
 
-def build(destination: Path, wheels: list[Path]) -> list[Path]:
+def build(destination: Path, wheels: list[Path], platforms=tuple(PLATFORMS)) -> list[Path]:
     """Run Blender's builder; the zips appear in ``destination`` only when all of them are complete."""
     version = tomllib.loads((ROOT / "blender_manifest.toml").read_text())["version"]
     with tempfile.TemporaryDirectory() as folder:
-        source, out = stage(Path(folder), wheels), Path(folder) / "out"
+        source, out = stage(Path(folder), wheels, platforms), Path(folder) / "out"
         out.mkdir()
         command = [sys.executable, str(builder()), "build", "--source-dir", str(source)]
         if wheels:

@@ -3,7 +3,7 @@
 
 from importlib import import_module
 
-from bpy.utils import register_class, unregister_class
+from ..headshop_addon.class_registry import register_all, unregister_all
 
 FILES = ("scan", "landmarks", "build", "muscles", "expressions", "bake")
 
@@ -12,13 +12,12 @@ _registered: list[type] = []
 
 def register():
     """Register the panels in the order of work."""
-    for name in FILES:
-        for cls in import_module(f".{name}", __package__).classes():
-            register_class(cls)
-            _registered.append(cls)
+    found = [cls for name in FILES for cls in import_module(f".{name}", __package__).classes()]
+    register_all(found)
+    _registered.extend(found)  # some are made anew at each call of classes()
 
 
 def unregister():
-    """Unregister the panels, last first."""
-    while _registered:
-        unregister_class(_registered.pop())
+    """Unregister the panels."""
+    unregister_all(_registered)
+    _registered.clear()

@@ -41,6 +41,16 @@ def bpy(blender):
     return blender
 
 
+@pytest.fixture
+def addon(bpy, reference):
+    """The bpy module with an empty scene and the extension enabled; disabled again afterwards."""
+    import addon_utils
+
+    assert addon_utils.enable("headshop", default_set=True) is not None
+    yield bpy
+    addon_utils.disable("headshop", default_set=True)
+
+
 @pytest.fixture(autouse=True)
 def _leave_no_scene_behind():
     """Tests that touched Blender leave an empty scene; tests of `sim` never import it."""

@@ -1,0 +1,167 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Every panel draws in every state of the work, names only what exists, and always says what to do next."""
+
+from types import SimpleNamespace
+
+import pytest
+
+
+class _Layout:
+    """Stands in for a layout: checks what is asked of it against Blender and keeps what is written."""
+
+    def __init__(self, bpy, seen):
+        self._bpy, self._seen = bpy, seen
+        self._icons = bpy.types.UILayout.bl_rna.functions["prop"].parameters["icon"].enum_items.keys()
+
+    def _icon(self, options):
+        assert options.get("icon", "NONE") in self._icons, options["icon"]
+
+    def _child(self, *_, **__):
+        return _Layout(self._bpy, self._seen)
+
+    row = column = split = box = grid_flow = _child
+
+    def label(self, *, text="", **options):
+        self._icon(options)
+        self._seen.append(text)
+
+    def operator(self, idname, *, text=None, **options):
+        self._icon(options)
+        module, _, name = idname.partition(".")
+        assert name in dir(getattr(self._bpy.ops, module)), f"no operator {idname}"
+        cls = getattr(self._bpy.types, f"{module.upper()}_OT_{name}")
+        self._seen.append(text if text is not None else cls.bl_label)
+        return _Properties(set(getattr(self._bpy.ops.headshop, name).get_rna_type().properties.keys()))
+
+    def prop(self, data, name, **options):
+        self._icon(options)
+        assert name in data.bl_rna.properties, name
+        self._seen.append(options.get("text", data.bl_rna.properties[name].name))
+
+    def progress(self, *, factor, type, text):
+        assert 0 <= factor <= 1 and type in ("BAR", "RING")
+        self._seen.append(text)
+
+    def template_list(self, cls, _id, data, name, active_data, active_name, **_):
+        assert hasattr(self._bpy.types, cls) and name in data.bl_rna.properties
+        assert active_name in active_data.bl_rna.properties
+        self._seen.append(name)
+
+
+class _Properties:
+    def __init__(self, known):
+        object.__setattr__(self, "_known", known)
+
+    def __setattr__(self, name, value):
+        assert name in self._known, f"the operator has no property {name}"
+
+
+def draw_all(bpy) -> dict[str, list[str]]:
+    """Panel -> everything written in it; panels whose poll says no are absent."""
+    context = SimpleNamespace(
+        scene=bpy.context.scene,
+        active_object=bpy.context.active_object,
+        preferences=SimpleNamespace(system=SimpleNamespace(ui_scale=1.0)),
+        region=SimpleNamespace(width=260),
+        mode=bpy.context.mode,
+    )
+    out = {}
+    for name in sorted(dir(bpy.types)):
+        if name.startswith("HEADSHOP_PT_"):
+            cls = getattr(bpy.types, name)
+            if "poll" in dir(cls) and not cls.poll(context):
+                continue
+            seen: list[str] = []
+            cls.draw(SimpleNamespace(layout=_Layout(bpy, seen), bl_label=cls.bl_label), context)
+            assert seen, f"{name} is empty"
+            out[name] = seen
+    return out
+
+
+def _text(drawn, panel):
+    return " ".join(drawn[f"HEADSHOP_PT_{panel}"])
+
+
+def test_an_empty_scene_tells_where_to_start(addon):
+    drawn = draw_all(addon)
+    assert "Start here" in _text(drawn, "scan")
+    for panel in ("landmarks", "build", "muscles", "expressions", "bake"):
+        assert "first" in _text(drawn, panel) or "scan with" in _text(drawn, panel)
+    assert not any(name.startswith("HEADSHOP_PT_muscles_") for name in drawn)
+
+
+@pytest.fixture
+def scan(addon, reference):
+    from headshop.headshop_addon import bridge, scan_landmarks
+
+    obj = bridge.mesh_to_object(reference.skin, "Scan")
+    addon.context.scene.collection.objects.link(obj)
+    addon.context.scene.headshop.scan = obj
+    scan_landmarks.entries(obj)
+    return obj
+
+
+def test_landmarks_are_counted_until_a_head_can_be_built(addon, scan, reference):
+    from headshop.headshop_addon import scan_landmarks
+
+    truth = reference.landmark_positions()
+    assert "four are enough" in _text(draw_all(addon), "landmarks")
+    for name in ("prn", "ex_r"):
+        scan_landmarks.put(scan, name, truth[name])
+    assert "2 placed, 2 more needed" in _text(draw_all(addon), "landmarks")
+    assert "at least four" in _text(draw_all(addon), "build")
+    scan_landmarks.replace(scan, {n: truth[n] for n in ("prn", "ex_r", "ex_l", "gn")})
+    drawn = draw_all(addon)
+    assert "4 placed, 56 estimated" in _text(drawn, "landmarks") and "Ready" in _text(drawn, "build")
+    assert "Place v" in _text(drawn, "landmark_list")
+
+
+def test_a_head_shows_every_slider_once_and_every_expression(addon, reference):
+    from headshop.headshop_addon import heads
+    from headshop.sim.acting.expressions import expressions
+
+    heads.create_head(reference, "Ref")
+    skin = heads.find_heads()[0]
+    heads.write_report(skin, {"fit": {"mean_mm": 0.4, "p95_mm": 1.5, "landmark_mean_mm": 2.0}})
+    drawn = draw_all(addon)
+    assert "0.40 mm" in _text(drawn, "build")
+    sliders = sum((seen for name, seen in drawn.items() if name.startswith("HEADSHOP_PT_muscles_")), [])
+    sides = [text for text in sliders if text in ("L", "R")]
+    paired = [muscle for muscle in reference.muscles if muscle.name.endswith(("_l", "_r"))]
+    assert len(sides) == len(paired)
+    assert len(drawn["HEADSHOP_PT_expressions"]) == 1 + len(expressions())
+
+
+def test_without_scipy_the_first_panel_says_what_to_do(addon, monkeypatch):
+    from headshop.headshop_addon import dependencies
+
+    monkeypatch.setattr(dependencies, "available", lambda name: name != "scipy")
+    drawn = draw_all(addon)
+    assert "scipy" in _text(drawn, "scan") and "install" in _text(drawn, "scan")
+    with pytest.raises(RuntimeError, match="scipy"):
+        addon.ops.headshop.make_sample()
+
+
+def test_without_xatlas_only_repacking_is_grey(addon, reference, monkeypatch):
+    from headshop.headshop_addon import dependencies, heads
+    from headshop.operators.repack_uv import HEADSHOP_OT_repack_uv
+
+    heads.create_head(reference, "Ref")
+    monkeypatch.setattr(dependencies, "available", lambda name: name != "xatlas")
+    assert "xatlas" in _text(draw_all(addon), "build")
+    assert "xatlas" in HEADSHOP_OT_repack_uv.description(addon.context, None)
+    with pytest.raises(RuntimeError, match="xatlas"):
+        addon.ops.headshop.repack_uv()
+    for name in ("build_head", "bake_expressions", "set_expression", "export_head"):
+        assert getattr(addon.ops.headshop, name).poll() or name == "build_head"
+
+
+def test_a_running_job_is_shown(addon):
+    from headshop.headshop_addon import jobs
+
+    jobs.running = jobs.Running("Build Head", 0.42, "Refining")
+    try:
+        for panel in ("scan", "build", "bake"):
+            assert "Build Head: 42%" in _text(draw_all(addon), panel)
+    finally:
+        jobs.running = None
