@@ -25,7 +25,7 @@ from .scanner import VirtualScanner
 from .sheets import joined
 from .skin_colour import Complexion, Paint, paint_skin
 
-SEED = 1
+SEED = 8
 
 #: Levels of subdivision: edges of the truth are then about a millimetre long.
 LEVELS = 3
@@ -70,11 +70,11 @@ def make_sample(
     reference = reference or load_head()
     person = individual(reference, rng)
     yield Progress(0.1, "Smoothing the skin")
-    person, surface, normals, inner = _smooth(person, reference, levels, rng)
+    person, surface, inner, ears = _smooth(person, reference, levels, rng)
     complexion = Complexion.draw(rng)
     yield Progress(0.3, "Painting the skin")
     landmarks = _on_surface(person.landmark_positions(), surface)
-    paint = paint_skin(surface.vertices, normals, landmarks, inner, complexion, rng)
+    paint = paint_skin(surface.vertices, landmarks, inner, ears, complexion, rng)
     paint = _dressed(paint, surface.vertices, landmarks, rng)
     surface = replace(surface, colour=paint.colour)
     turn, shift = _pose(rng)
@@ -117,7 +117,7 @@ def write_sample(sample: Sample, directory) -> list[Path]:
 
 
 def _smooth(person, reference, levels, rng):
-    """The head with its skin on a smooth surface, that surface, its normals and how much its vertices lie inside."""
+    """The head with its skin on a smooth surface, that surface, and the groups inner and ears on it."""
     faces, n = person.skin.faces, len(person.skin.vertices)
     operator, quads, _ = subdivision(faces, n, levels)
     operator = (limit(quads, operator.shape[0]) @ operator).tocsr()
@@ -126,14 +126,17 @@ def _smooth(person, reference, levels, rng):
     for _ in range(2):
         cage += 0.8 * (person.skin.vertices - operator[:n] @ cage)
     points = operator @ cage
-    inner = np.clip(operator @ reference.groups["inner"].astype(float), 0, 1)
+    groups = reference.groups
+    inner, ears = (
+        np.clip(operator @ g.astype(float), 0, 1) for g in (groups["inner"], groups["ear_l"] + groups["ear_r"])
+    )
     surface = Mesh(points, quads)
     normals = vertex_normals(points, surface.triangles)
     rest = operator @ reference.skin.vertices  # the unevenness of skin belongs to the skin, not to space
     relief = (0.07 * Noise(rng, 7.0)(rest) + 0.02 * Noise(rng, 2.5)(rest)) * (1 - inner)
     points = points + relief[:, None] * normals
     truth = replace(person, parts=person.parts | {"skin": person.skin.moved(points[:n])})
-    return truth, Mesh(points, quads), normals, inner
+    return truth, Mesh(points, quads), inner, ears
 
 
 def _on_surface(positions, surface):

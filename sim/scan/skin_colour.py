@@ -19,7 +19,7 @@ IRIS = ((0.07, 0.035, 0.015), (0.10, 0.15, 0.19), (0.085, 0.085, 0.045), (0.035,
 
 #: Absorption per channel of melanin and of blood, relative.
 MELANIN = np.array([0.40, 0.75, 1.15])
-BLOOD = np.array([0.10, 0.75, 0.60])
+BLOOD = np.array([0.12, 0.72, 0.48])
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,15 +51,16 @@ class Complexion:
         return cls(TONES[tone], HAIR[hair], IRIS[iris], freckles, float(rng.choice([0.0, 0.35, 0.7])))
 
 
-def paint_skin(points, normals, landmarks, inner, complexion: Complexion, rng: np.random.Generator) -> Paint:
+def paint_skin(points, landmarks, inner, ears, complexion: Complexion, rng: np.random.Generator) -> Paint:
     """Paint the vertices of a skin.
 
-    points (n, 3) mm in standard posture; normals (n, 3); landmarks : the 60; inner (n,) 0..1 in mouth bag and nostrils
+    points (n, 3) mm in standard posture; landmarks : the person's 60; inner, ears (n,) 0..1 : what lies in mouth and
+    nostrils, what belongs to the ears
     """
-    at = _Places(points, landmarks)
+    at = _Places(points, landmarks, ears)
     melanin, blood = _uneven(points, rng)
     blood += 0.30 * at.blob(("or", "ac", "zy"), 21) + 0.22 * at.near("prn", 13) + 0.16 * at.blob(("al", "ac"), 8)
-    blood += 0.20 * at.ears() + 0.10 * at.near("pg", 13) + 0.08 * at.near("g", 16)
+    blood += 0.20 * at.ears + 0.10 * at.near("pg", 13) + 0.08 * at.near("g", 16)
     lids = at.blob(("ps", "pi", "os"), 9.5)
     blood += 0.14 * lids
     melanin += 0.10 * lids + 0.10 * at.blob(("pi", "or", "en"), 9) + 0.08 * at.blob(("en",), 6)
@@ -68,14 +69,14 @@ def paint_skin(points, normals, landmarks, inner, complexion: Complexion, rng: n
 
     lips = _lips(at)
     blood += lips * (0.72 + 0.12 * Noise(rng, 2.0)(points * [1.6, 1, 0.35]))
-    melanin += 0.16 * lips
+    melanin += 0.08 * lips
     seam = np.exp(-(((at.z - at.mouth_line()) / 0.9) ** 2)) * at.mouth_width(0.98) * at.front()
     blood += 0.9 * seam
-    melanin += 0.5 * seam + 1.2 * inner
+    melanin += 0.5 * seam + 0.2 * inner
+    blood += 1.0 * inner
 
-    light = np.asarray(complexion.tone) * np.exp(
-        -melanin[:, None] * MELANIN - np.clip(blood, -0.3, None)[:, None] * BLOOD
-    )
+    absorbed = melanin[:, None] * MELANIN + np.clip(blood, -0.3, None)[:, None] * BLOOD + 0.9 * inner[:, None]
+    light = np.asarray(complexion.tone) * np.exp(-absorbed)
     fine = Noise(rng, 1.5)
     brows = _brows(at, points, rng)
     lashes = _lashes(at, landmarks)
@@ -92,8 +93,8 @@ def paint_skin(points, normals, landmarks, inner, complexion: Complexion, rng: n
 class _Places:
     """Where the vertices are relative to landmarks."""
 
-    def __init__(self, points, landmarks):
-        self.points, self.landmarks = points, landmarks
+    def __init__(self, points, landmarks, ears):
+        self.points, self.landmarks, self.ears = points, landmarks, np.clip(ears, 0, 1)
         self.x, self.y, self.z = points.T
         self.left = self.x > landmarks["prn"][0]
 
@@ -108,16 +109,6 @@ class _Places:
         """The same about the middle of paired landmarks, on both sides."""
         middles = [self.of(*(n + side for n in names)) for side in ("_l", "_r")]
         return sum(np.exp(-((self.points - m) ** 2).sum(axis=1) / (2 * reach**2)) for m in middles)
-
-    def ears(self):
-        out = np.zeros(len(self.points))
-        for side in ("_l", "_r"):
-            root, tip, low = (self.landmarks[n + side] for n in ("pra", "pa", "sba"))
-            high = self.landmarks["sa" + side]
-            inside = (self.y > root[1] - 4) & (self.y < tip[1] + 6) & (self.z > low[2] - 3) & (self.z < high[2] + 3)
-            inside &= np.abs(self.x) > abs(self.landmarks["t" + side][0]) - 3
-            out += inside
-        return np.clip(out, 0, 1)
 
     def side(self, name):
         """The landmark of each vertex's own side, (n, 3)."""
@@ -226,13 +217,13 @@ def _lashes(at, landmarks):
 def _scalp(at):
     """Where hair would grow on the head: above a line over trichion, temples and behind the ears."""
     tr, t = at.landmarks["tr"], at.side("t")
-    ft, sa = at.side("ft"), at.side("sa")
+    ft = at.side("ft")
     back = np.clip((at.y - tr[1]) / np.maximum(t[:, 1] - tr[1], 1), 0, 1.6)
     # height of the hairline: trichion in front, down the temple before the ear, round behind it to the nape
     line = np.interp(back, [0, 0.35, 0.62, 0.8, 0.97, 1.25, 1.6], [0, -0.10, -0.45, -0.85, -1.05, -1.3, -2.2])
     height = tr[2] + line * (tr[2] - t[:, 2]) - 6 * np.clip(np.abs(at.x) / np.abs(ft[:, 0]) - 0.7, 0, 1)
     cover = _soft(at.z - height, 16)
-    return cover * (1 - at.ears()) * (at.y > tr[1] - 12) * (sa[:, 0] == sa[:, 0])
+    return cover * (1 - at.ears) * (at.y > tr[1] - 12)
 
 
 def _beard(at, lips):
@@ -241,6 +232,8 @@ def _beard(at, lips):
     t = at.side("t")
     toward = np.clip((at.y - ch[:, 1]) / np.maximum(t[:, 1] - ch[:, 1], 1), 0, 1)
     top = ch[:, 2] + 6 + (t[:, 2] - 12 - ch[:, 2]) * toward**1.5
-    top = np.where(np.abs(at.x) < np.abs(ch[:, 0]) * 1.05, np.maximum(top, sn[2] - 1.0), top)
-    cover = _soft(top - at.z, 10) * _soft(at.z - (gn[2] - 26), 20) * (1 - lips) * (1 - at.ears())
-    return cover * (at.y < np.maximum(t[:, 1], go[:, 1]) + 6)
+    lip = _soft(np.abs(ch[:, 0]) * 1.05 - np.abs(at.x), 12)
+    top = top + lip * (np.maximum(top, sn[2] - 1.0) - top)
+    cover = _soft(top - at.z, 16) * _soft(at.z - (gn[2] - 24), 26) * (1 - lips) * (1 - at.ears)
+    behind = np.maximum(t[:, 1] - 4, go[:, 1])
+    return cover * _soft(behind - at.y, 16)
