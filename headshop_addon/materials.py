@@ -10,10 +10,11 @@ from scipy.spatial import cKDTree
 
 from ..sim.anatomy.head import MATERIALS, Eye, Head, Muscle
 from ..sim.mesh import Mesh
-from . import heads
+from . import bridge, heads
 from .anatomy_materials import FIBRE, REST, anatomy_material
 from .eye_materials import EYE, eye_material
-from .skin_material import skin_material
+from .scan_colour import ScanColour, colour_image
+from .skin_material import COLOUR, skin_material
 from .skin_paint import paint_skin, write_vectors
 
 _EYE_KINDS = ("sclera", "iris", "pupil", "cornea")
@@ -36,11 +37,12 @@ def dress_head(skin: bpy.types.Object) -> None:
         place = mesh.vertices @ axes.T
         if part == "skin":
             paint_skin(obj, mesh, head.groups, place, {n: axes @ p for n, p in head.landmark_positions().items()})
+            own = _scan_skin(skin, mesh, head.groups["inner"])
         elif part in ("eye_l", "eye_r"):
             write_vectors(obj.data, EYE, eye_coordinates(mesh, head.eyes[part == "eye_r"], axes[2]))
         else:
             write_vectors(obj.data, REST, place)
-        _fill_slots(obj, [_material(kind) for kind in MATERIALS[part]])
+        _fill_slots(obj, [own if part == "skin" and own else _material(kind) for kind in MATERIALS[part]])
     muscles = heads.muscles_of(skin)
     for muscle in head.muscles:
         if muscle.name in muscles:
@@ -58,6 +60,26 @@ def head_axes(head: Head) -> np.ndarray:
     back -= left * (back @ left)
     back /= np.linalg.norm(back)
     return np.array([left, back, np.cross(left, back)])
+
+
+def _scan_skin(skin: bpy.types.Object, mesh: Mesh, inner: np.ndarray) -> bpy.types.Material | None:
+    """A skin material of the head's own that shows its scan's colours; None if the scan has none or is gone."""
+    scan = heads.scan_of(skin)
+    if scan is None:
+        return None
+    bpy.context.view_layer.update()  # matrix_world of objects that were just made
+    seen = bridge.object_to_mesh(scan)
+    if seen.colour is None or not len(seen.faces):
+        return None
+    matrix = np.array(skin.matrix_world.inverted() @ scan.matrix_world)
+    seen = seen.moved(seen.vertices @ matrix[:3, :3].T + matrix[:3, 3] / bridge.METRES)
+    name = heads.head_name(skin)
+    painted = colour_image(mesh, ScanColour(seen), inner, f"{name} Colour")
+    if painted is None:
+        return None
+    image, colour = painted
+    write_vectors(skin.data, COLOUR, np.column_stack([colour, np.ones(len(colour))]))
+    return skin_material(f"Head Shop Skin {name}", image)
 
 
 def _material(kind: str) -> bpy.types.Material:

@@ -74,8 +74,9 @@ def masks(groups: dict[str, np.ndarray], link) -> np.ndarray:
     bag = group(groups, "mouth_bag", n)
     lips = np.maximum(group(groups, "lip_upper", n), group(groups, "lip_lower", n))
     shine = np.max([amount * group(groups, name, n) for name, amount in SHINE.items()], axis=0)
-    inner = np.maximum(bag, 0.55 * group(groups, "inner", n))
-    return np.clip(np.column_stack([lips, inner, smoothed(shine, link, 3), np.ones(n)]), 0, 1)
+    # lid backs come to light in a blink: they stay skin
+    inside = np.maximum(bag, 0.6 * group(groups, "inner", n) * group(groups, "nostril", n))
+    return np.clip(np.column_stack([lips, inside, smoothed(shine, link, 3), np.ones(n)]), 0, 1)
 
 
 def brow_coordinates(place: np.ndarray, at: dict[str, np.ndarray]) -> np.ndarray:

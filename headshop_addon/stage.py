@@ -23,10 +23,10 @@ LENS_MM = 100.0
 #: role -> (degrees to the image's right, degrees up, distance, (width, height), watts, colour). Lengths are in head
 #: heights; watts are for a head of `USUAL_HEIGHT` and grow with its square.
 LIGHTS = {
-    "Key": (-42, 34, 4.6, (1.8, 1.8), 17.0, (1.0, 0.955, 0.90)),
+    "Key": (-44, 24, 4.6, (1.8, 1.8), 17.0, (1.0, 0.955, 0.90)),
     "Fill": (52, 6, 5.2, (4.4, 4.4), 3.2, (0.86, 0.93, 1.0)),
-    "Rim": (148, 30, 4.0, (1.1, 3.4), 17.0, (0.90, 0.95, 1.0)),
-    "Kicker": (-152, 22, 4.4, (0.9, 3.4), 9.0, (1.0, 0.96, 0.9)),
+    "Rim": (146, 14, 4.0, (1.1, 3.4), 17.0, (0.90, 0.95, 1.0)),
+    "Kicker": (-150, 10, 4.4, (0.9, 3.4), 9.0, (1.0, 0.96, 0.9)),
 }
 USUAL_HEIGHT = 0.225
 

@@ -1,0 +1,142 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The scan's colours carried over to the skin: an image on the skin's UV map, its holes filled, its light evened.
+
+Colour comes from the scan points nearest to each texel; where there are none near enough, it spreads over the surface
+like a membrane. Broad changes of brightness are taken to be light, not skin, and are partly taken out.
+"""
+
+import bpy
+import numpy as np
+from scipy.ndimage import distance_transform_edt
+from scipy.spatial import cKDTree
+
+from ..sim.mesh import Mesh, vertex_normals
+from .skin_paint import adjacency, smoothed, spread
+
+NEIGHBOURS = 4
+#: mm beyond the scan's own spacing within which its colour counts fully, and beyond which it does not count
+NEAR, FAR = 1.5, 4.0
+EVENING = 0.55  # how much of the broad shading is taken out
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+
+
+def to_linear(colour: np.ndarray) -> np.ndarray:
+    """Linear from sRGB values 0..1."""
+    return np.where(colour <= 0.04045, colour / 12.92, ((colour + 0.055) / 1.055) ** 2.4)
+
+
+def to_srgb(colour: np.ndarray) -> np.ndarray:
+    """sRGB from linear values 0..1."""
+    return np.where(colour <= 0.0031308, colour * 12.92, 1.055 * np.maximum(colour, 0) ** (1 / 2.4) - 0.055)
+
+
+class ScanColour:
+    """A scan's colours, to be asked for at points near its surface.
+
+    scan : Mesh in mm, with colours, standing where the skin stands
+    """
+
+    def __init__(self, scan: Mesh):
+        self.normals = vertex_normals(scan.vertices, scan.triangles)
+        self.colour = to_linear(np.asarray(scan.colour, dtype=float))
+        self.tree = cKDTree(scan.vertices)
+        some = scan.vertices[:: max(len(scan.vertices) // 2000, 1)]
+        self.spacing = float(np.median(self.tree.query(some, k=2)[0][:, 1]))
+
+    def at(self, points: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Linear colours (k, 3) and confidences (k,) 0..1 at points (k, 3) mm of a surface with normals (k, 3)."""
+        distance, index = self.tree.query(points, k=NEIGHBOURS, workers=-1)
+        # what faces another way is the other side of something thin, such as an ear
+        facing = np.clip(np.einsum("knj,kj->kn", self.normals[index], normals) * 2 - 0.2, 0, 1)
+        weight = facing / (distance + 0.3 * self.spacing) ** 2
+        total = weight.sum(axis=1, keepdims=True)
+        colour = (self.colour[index] * weight[..., None]).sum(axis=1) / np.maximum(total, 1e-12)
+        near = self.spacing + NEAR
+        confidence = np.clip((near + FAR - NEAR - distance[:, 0]) / (FAR - NEAR), 0, 1) * facing.max(axis=1)
+        return colour, confidence
+
+
+def vertex_colour(skin: Mesh, source: ScanColour, inner: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+    """Linear colour (n, 3) of each skin vertex and the gain (n,) that evens the light; None if the scan is elsewhere.
+
+    inner : (n,) 0..1, what no scanner sees
+    """
+    colour, confidence = source.at(skin.vertices, vertex_normals(skin.vertices, skin.triangles))
+    confidence = confidence * (1 - np.clip(inner, 0, 1))
+    if (confidence > 0.5).sum() < 0.05 * len(confidence):
+        return None
+    link = adjacency(skin)
+    # islands of doubtful colour at the edge of holes count less
+    confidence = confidence * np.clip(2 * smoothed(confidence, link, 3) - 0.5, 0, 1)
+    colour = spread(colour, confidence, link)
+    bright = np.log(np.maximum(colour @ LUMINANCE, 0.004))
+    broad = smoothed(bright, link, 60)
+    centre = np.average(broad, weights=confidence + 1e-9)
+    gain = np.exp(np.clip(-EVENING * (broad - centre), -0.6, 0.5))
+    # keep the person's own tone, but no darker or brighter than skin can be
+    tone = float(np.exp(centre))
+    return colour, gain * np.clip(tone, 0.05, 0.42) / tone
+
+
+def texels(skin: Mesh, size: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """What each covered texel of a size x size image shows: texel index (k,), corners (k, 3), weights (k, 3).
+
+    Every triangle is strewn with points finer than the texels; one point is kept for each texel.
+    """
+    faces, uv = skin.faces, skin.uv
+    quad = np.flatnonzero(faces[:, 3] >= 0)
+    corners = np.concatenate([faces[:, :3], faces[quad][:, [0, 2, 3]]])
+    place = np.concatenate([uv[:, :3], uv[quad][:, [0, 2, 3]]]).astype(float) * size
+    edge = np.linalg.norm(place - np.roll(place, 1, axis=1), axis=2).max(axis=1)
+    parts = np.clip(edge * 1.25, 1, 4 * size)
+    parts = np.ceil(2 ** (np.ceil(4 * np.log2(parts)) / 4)).astype(int)  # few different ones: like goes with like
+    found, owner, inside = [], [], []
+    for n in np.unique(parts):
+        i, j = np.divmod(np.arange((n + 1) ** 2), n + 1)
+        keep = i + j <= n
+        weights = np.column_stack([i, j, n - i - j])[keep] / n
+        of = np.flatnonzero(parts == n)
+        pixel = np.floor(np.einsum("pk,tkc->tpc", weights, place[of])).astype(int).clip(0, size - 1)
+        found.append((pixel[..., 1] * size + pixel[..., 0]).ravel())
+        owner.append(np.repeat(of, len(weights)))
+        inside.append(np.tile(weights, (len(of), 1)))
+    index, first = np.unique(np.concatenate(found), return_index=True)
+    return index, corners[np.concatenate(owner)[first]], np.concatenate(inside)[first]
+
+
+def colour_image(skin: Mesh, source: ScanColour, inner: np.ndarray, name: str, size: int = 768):
+    """Paint the scan's colours on the skin's UV map: (packed image, linear colour (n, 3) per vertex) or None.
+
+    None if the scan has no part near the skin, or the skin has no UV map.
+    """
+    found = vertex_colour(skin, source, inner)
+    if found is None or skin.uv is None:
+        return None
+    colour, gain = found
+    index, corners, weights = texels(skin, size)
+    normals = vertex_normals(skin.vertices, skin.triangles)
+
+    def across(values: np.ndarray) -> np.ndarray:
+        return np.einsum("kc,kc...->k...", weights, values[corners])
+
+    fine, confidence = source.at(across(skin.vertices), across(normals))
+    confidence = (confidence * (1 - across(np.clip(inner, 0, 1))))[:, None]
+    painted = (confidence * fine + (1 - confidence) * across(colour)) * across(gain)[:, None]
+    pixels = np.zeros((size * size, 3))
+    pixels[index] = np.clip(painted, 0, 1)
+    covered = np.zeros(size * size, dtype=bool)
+    covered[index] = True
+    _, nearest = distance_transform_edt(~covered.reshape(size, size), return_indices=True)
+    pixels = pixels.reshape(size, size, 3)[nearest[0], nearest[1]]
+    image = bpy.data.images.get(name)
+    if image is not None and tuple(image.size) != (size, size):
+        bpy.data.images.remove(image)
+        image = None
+    if image is None:
+        image = bpy.data.images.new(name, size, size, alpha=False)
+    rgba = np.ones((size, size, 4), dtype=np.float32)
+    rgba[..., :3] = to_srgb(pixels)
+    image.pixels.foreach_set(rgba.ravel())
+    image.update()
+    image.pack()
+    return image, colour * gain[:, None]
