@@ -17,6 +17,7 @@ from .structures import Layers, MuscleField
 JAW_MUSCLES = ("masseter", "temporalis", "pterygoideus_medialis", "pterygoideus_lateralis", "digastricus")
 #: Muscles whose work `lids` does as a turn of the lid over the eyeball.
 LID_MUSCLES = ("levator_palpebrae", "orbicularis_oculi_palpebral", "orbicularis_oculi_lacrimal")
+_LIDS = ("upper_l", "upper_r", "lower_l", "lower_r")
 _DEPTH = 16.0  # mm between a fibre and the fascia it may still move
 
 
@@ -116,6 +117,10 @@ def build_muscle_field(head: Head, layers: Layers, table: dict) -> MuscleField:
     fascia = layers.nodes[n : 2 * n]
     usable = np.flatnonzero(layers.free[:n])
     normals = vertex_normals(head.skin.vertices, head.skin.triangles)[usable]
+    # lids are turned over the eyeball by `lids`; the eye sockets behind them have no muscle
+    lid = np.max([np.asarray(head.groups.get(f"lid_{k}", np.zeros(n))) for k in _LIDS], axis=0)
+    socket = np.asarray(head.groups.get("inner", np.zeros(n))) - np.asarray(head.groups.get("mouth_bag", np.zeros(n)))
+    spare = (np.clip(1 - lid, 0, 1) ** 2 * (socket < 0.5))[usable]
     owner, column, weight, direction, tie = [], [], [], [], []
     reach, excursion = [], []
     for k, muscle in enumerate(head.muscles):
@@ -134,6 +139,7 @@ def build_muscle_field(head: Head, layers: Layers, table: dict) -> MuscleField:
             w, d = _arc(muscle, fascia[usable], normals)
         else:
             w, d = _linear(muscle, fascia[usable], normals)
+        w = w * spare
         keep = w > 0.02
         size = np.linalg.norm(d, axis=1, keepdims=True)
         unit = d / np.maximum(size, 1e-9)

@@ -25,7 +25,7 @@ class Parameters:
     #: mm² of skin that one through-spring of the paper stands for (684 elements on a face patch; about 8 mm edges).
     element_area: float = 28.0
     #: k1 of 3.6, per mm³ of relative change.
-    volume: float = 12.0
+    volume: float = 30.0
     #: nodal restoration h of 3.8, per mm² of skin, over bone under `restoration_thickness` mm of tissue.
     restoration_area: float = 0.55
     restoration_thickness: float = 8.0
