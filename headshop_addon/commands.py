@@ -157,15 +157,16 @@ def _start_blender() -> None:
     ------
     InputError : it is not installed.
     """
+    from .quiet import quiet
+
     try:
-        import bpy
+        with quiet():
+            import bpy
     except ModuleNotFoundError as error:
         raise InputError(
             "Blender's module is not installed here: run pip install bpy==5.0.1 (Python 3.11) or bpy==5.2.3 (Python "
             "3.13), or use blender --command headshop."
         ) from error
-    from .quiet import quiet
-
     with quiet():
         bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
 

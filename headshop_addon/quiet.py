@@ -1,18 +1,47 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Blender's importers, exporters and file readers print from C; this keeps them off the terminal for a moment."""
+"""Calls into Blender that neither print nor break.
 
+Importers, exporters and file readers print from C, and a Ctrl-C that strikes Python inside them can crash the process.
+"""
+
+import ctypes
 import os
+import signal
 import sys
 import tempfile
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
 
 
 @contextmanager
 def quiet():
-    """Send what Blender prints (file descriptors 1 and 2) into a temporary file; yields a function that reads it.
+    """Hold back what Blender prints, and Ctrl-C until the end; yields a function that reads what was printed.
 
-    Without a terminal to print to, as in a windowed program, nothing is redirected.
+    Where there is no terminal to print to, as in a windowed program, nothing is redirected.
     """
+    with _patient(), _redirected() as text:
+        yield text
+
+
+@contextmanager
+def _patient():
+    """Ctrl-C takes effect at the end instead of in the middle."""
+    struck = []
+    try:
+        before = signal.signal(signal.SIGINT, lambda *_: struck.append(True))
+    except ValueError:  # not the main thread: no signals arrive here
+        yield
+        return
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before if before is not None else signal.SIG_DFL)
+        if struck:
+            raise KeyboardInterrupt
+
+
+@contextmanager
+def _redirected():
+    """File descriptors 1 and 2, and Python's own streams, go into a temporary file."""
     try:
         saved = os.dup(1), os.dup(2)
     except OSError:
@@ -21,14 +50,17 @@ def quiet():
     with tempfile.TemporaryFile() as kept:
 
         def text() -> str:
+            _flush()
             kept.seek(0)
             return kept.read().decode(errors="replace")
 
         _flush()
         os.dup2(kept.fileno(), 1)
         os.dup2(kept.fileno(), 2)
+        stream = os.fdopen(os.dup(kept.fileno()), "w", encoding="utf-8", errors="replace")
         try:
-            yield text
+            with stream, redirect_stdout(stream), redirect_stderr(stream):  # whatever Python prints through
+                yield text
         finally:
             _flush()
             for number, descriptor in zip((1, 2), saved, strict=True):
@@ -37,6 +69,9 @@ def quiet():
 
 
 def _flush():
+    """Empty the buffers of Python and of C, lest they be emptied onto the wrong descriptor."""
     for stream in (sys.stdout, sys.stderr):
         if stream is not None:
             stream.flush()
+    library = ctypes.cdll.ucrtbase if sys.platform == "win32" else ctypes.CDLL(None)
+    library.fflush(None)
