@@ -8,7 +8,6 @@ import subprocess
 import sys
 import time
 
-import numpy as np
 import pytest
 from headshop.headshop_addon.command_line import main
 from headshop.sim.anatomy.head import Head
@@ -202,12 +201,3 @@ def test_without_blender_there_is_a_sentence(tmp_path, scan, landmarks):
     done = subprocess.run(command, capture_output=True, text=True, env=os.environ | {"PYTHONSAFEPATH": "1"})
     assert done.returncode == 2 and "pip install bpy" in done.stderr and done.stderr.count("\n") == 1
     assert sorted(tmp_path.rglob("*")) == before
-
-
-def test_a_scan_with_nan_is_cleaned_and_counted(bpy, capfd, tmp_path, scan, landmarks, reference):
-    vertices = reference.skin.vertices.copy()
-    vertices[:3] = np.nan
-    write_ply(scan, reference.skin.moved(vertices))
-    assert main([str(argument) for argument in build(scan, landmarks(), tmp_path)]) == 0
-    report = json.loads((tmp_path / "plain" / "report.json").read_text())
-    assert report["scan"]["nonfinite_vertices"] == 3
