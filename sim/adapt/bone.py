@@ -71,23 +71,25 @@ def keep_inside(bone: Mesh, skin: Surface, least, rounds: int = 12) -> np.ndarra
     moved = start.copy()
     pulled = np.zeros(n, dtype=bool)
     goal = np.zeros((n, 3))
+    watch = np.arange(n)
     for turn in range(rounds):
-        depth, found = depth_under(moved, skin, NEAR)
-        lack = least - depth
-        bad = found.found & (lack > 1e-3)
-        if not bad.any():
+        depth, found = depth_under(moved[watch], skin, NEAR)
+        lack = least[watch] - depth
+        wrong = found.found & (lack > 1e-3)
+        if not wrong.any():
             return moved
-        way = np.where(found.found[:, None], found.points - moved, 0)
-        way *= np.where(depth < 0, 1.0, -1.0)[:, None]
+        way = (found.points - moved[watch])[wrong] * np.where(depth[wrong] < 0, 1.0, -1.0)[:, None]
         length = np.linalg.norm(way, axis=1, keepdims=True)
-        # On the skin itself, or where the way is unsure (edges), the skin's own normal tells.
-        way = np.where(length > 0.05, way / np.maximum(length, 1e-9), -found.normals)
-        goal[bad] = (moved - start + (lack[:, None] + 0.05) * way)[bad]
-        pulled |= bad
+        # On the skin itself the way is unsure, and the skin's own normal tells.
+        way = np.where(length > 0.05, way / np.maximum(length, 1e-9), -found.normals[wrong])
+        bad, push = watch[wrong], (lack[wrong, None] + 0.05) * way
+        goal[bad] = moved[bad] - start[bad] + push
+        pulled[bad] = True
+        watch = watch[found.found & (lack > -4.0)]  # what is that much deeper than it must be, stays so
         if turn < rounds - 4:
             weight = diags(np.where(pulled, 3.0, 0.0))
             shift = factorised((smooth + weight).tocsc())(csr_matrix(weight) @ goal)
             moved = start + shift
         else:  # what smoothness will not give, is given without
-            moved = np.where(bad[:, None], moved + (lack[:, None] + 0.05) * way, moved)
+            moved[bad] += push
     return moved

@@ -11,6 +11,7 @@ from ..mesh import Mesh
 from ..progress import Progress, Work
 from . import bone, eyeballs
 from .closest import Surface
+from .openings import rims, sealed_lids
 from .refine import thinned
 from .skin_fit import SkinFit, group
 from .thin_plate_spline import ThinPlateSpline, similarity
@@ -66,6 +67,8 @@ def carry(reference: Head, fit: SkinFit) -> Work:
     final = fitted.copy()
     final[inner] = warp.transform(skin.vertices[inner])
     for k, side in enumerate(("l", "r")):
+        if side in fit.closed:
+            final = sealed_lids(reference, rims(reference), final, eyes[k], side)
         final = lids_on_eye(reference, final, parts[f"eye_{side}"], eyes[k], k, side, inner)
     muscles = tuple(carried_muscle(m, warp) for m in reference.muscles)
 

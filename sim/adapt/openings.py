@@ -14,7 +14,8 @@ from .fine_fit import Anchors
 
 TOGETHER = 3.0  # weight of a pair of rim points, against 1 for a point of data
 CLOSED = 0.3  # opening of the lids against the reference's below which an eye counts as closed
-CREASE = 0.25  # mm between the margins of closed lids
+THICK = 1.1  # mm from the margin of a closed lid to its back
+CREASE = 0.15  # mm between the margins of closed lids
 
 
 def rims(reference: Head) -> np.ndarray:
@@ -79,6 +80,84 @@ def lid_pairs(reference: Head, rim, side: str):
     step = base[after] - base[after - 1]
     share = np.clip((place - base[after - 1]) / np.where(step > 1e-9, step, 1), 0, 1)
     return upper, np.stack([lower[after - 1], lower[after]], axis=1), share
+
+
+def sealed_lids(reference: Head, rim, skin, eye, side: str) -> np.ndarray:
+    """Skin vertices (n, 3) with the backs of closed lids drawn up behind their margins, so that the lids meet over the
+    whole of a lid's thickness and not on one edge, which a smooth surface through them would round off."""
+    pair = edges(reference.skin.faces)
+    inner = np.asarray(reference.groups["inner"]) > 0.5
+    out = np.array(skin)
+    both = np.concatenate([pair, pair[:, ::-1]])
+    margin = np.concatenate([_rim_of(reference, rim, f"lid_{x}_{side}") for x in ("upper", "lower")])
+    both = both[np.isin(both[:, 0], margin) & inner[both[:, 1]]]
+    into = eye.centre - skin[both[:, 0]]
+    into /= np.maximum(np.linalg.norm(into, axis=1, keepdims=True), 1e-9)
+    behind = skin[both[:, 0]] + THICK * into
+    count = np.bincount(both[:, 1], minlength=len(skin))
+    rows = np.flatnonzero(count)
+    for axis in range(3):
+        total = np.bincount(both[:, 1], behind[:, axis], minlength=len(skin))
+        out[rows, axis] = total[rows] / count[rows]
+    return out
+
+
+def _eye_frame(en, ex, up):
+    """Origin and rows (along, upward, forward) of an eye: from the inner to the outer corner; ``up`` roughly."""
+    along = ex - en
+    along = along / np.linalg.norm(along)
+    upward = up - (up @ along) * along
+    upward = upward / np.linalg.norm(upward)
+    return np.stack([along, upward, np.cross(along, upward)])
+
+
+def lid_margins(reference: Head, rim, given, matrix, closed=()):
+    """Where the margins of the lids belong: extra landmarks on the rims of both eyes.
+
+    A squinting or closed eye keeps the shape of its margins, lower or higher, so each is scaled to pass the height of
+    its one landmark (``ps``, ``pi``), wherever along the lid that was picked; a warp through the landmark alone would
+    pinch the lid there.
+
+    matrix (3, 3) turns the reference into the scan's place; closed: sides of closed eyes, whose upper margin comes to
+    lie along the lower one. Returns vertices (k,), targets (k, 3).
+    """
+    v, rest = reference.skin.vertices, reference.landmark_positions()
+    rows, targets = [], []
+    for side in ("l", "r"):
+        corners = [f"en_{side}", f"ex_{side}"]
+        if not all(n in given and n in rest for n in corners):
+            continue
+        old, new = (
+            _eye_frame(p[corners[0]], p[corners[1]], up) for p, up in ((rest, np.eye(3)[2]), (given, matrix[:, 2]))
+        )
+        start, length = rest[corners[0]], np.linalg.norm(rest[corners[1]] - rest[corners[0]])
+        goal, reach = given[corners[0]], np.linalg.norm(given[corners[1]] - given[corners[0]])
+        scale = reach / length
+        below = None
+        for lid, mark in (("lower", f"pi_{side}"), ("upper", f"ps_{side}")):
+            margin = _rim_of(reference, rim, f"lid_{lid}_{side}")
+            if mark not in given or mark not in rest or len(margin) < 3:
+                continue
+            local = (v[margin] - start) @ old.T
+            order = np.argsort(local[:, 0], kind="stable")
+            margin, local = margin[order], local[order]
+            picked = (given[mark] - goal) @ new.T / scale
+            here = [np.interp(picked[0], local[:, 0], local[:, k]) for k in (1, 2)]
+            crest = local[np.abs(local[:, 1]).argmax(), 1]
+            bulge = np.clip(local[:, 1] / crest, 0, 1)  # 0 at the corners, 1 where the margin is highest
+            share = np.clip(here[0] / crest, 0.4, 1)
+            lift = ((picked[1] - here[0]) / share, np.clip((picked[2] - here[1]) / share, -4, 4))
+            local[:, 1] += bulge * lift[0]
+            local[:, 2] += bulge * lift[1]
+            if side in closed and lid == "upper" and below is not None:
+                for k, gap in ((1, CREASE / scale), (2, 0.0)):
+                    local[:, k] = np.interp(local[:, 0], below[:, 0], below[:, k]) + gap
+            below = local
+            rows.append(margin)
+            targets.append(goal + scale * local @ new)
+    if not rows:
+        return np.zeros(0, dtype=int), np.zeros((0, 3))
+    return np.concatenate(rows), np.concatenate(targets)
 
 
 def closed_eyes(reference: Head, landmarks, given) -> list[str]:

@@ -18,11 +18,15 @@ GIVE = 0.4  # mm: smoothing of the warp, so that two landmarks close together do
 
 @dataclass(frozen=True, eq=False)
 class Pairs:
-    """Landmarks on the source (k, 3) and on the target (k, 3), mm, and how much each may give way (k,), mm."""
+    """Landmarks on the source (k, 3) and on the target (k, 3), mm, and how much each may give way (k,), mm.
+
+    The first ``marks`` of them are the vertices of the feature mesh.
+    """
 
     source: np.ndarray
     target: np.ndarray
     give: np.ndarray
+    marks: int
 
 
 def sampling_sites(points, normals, target: Surface, reach):
@@ -82,7 +86,7 @@ def refine(skin, outer, target: Surface, feature_mesh, pairs: Pairs, rounds: int
     triangles = np.asarray(feature_mesh, dtype=np.int32)
     skin = np.array(skin, dtype=float)
     landmark_s, landmark_t, give = pairs.source.copy(), pairs.target.copy(), pairs.give.copy()
-    shape_s, shape_t = pairs.source.copy(), pairs.target.copy()  # F and F*
+    shape_s, shape_t = pairs.source[: pairs.marks].copy(), pairs.target[: pairs.marks].copy()  # F and F*
     warps = []
     for turn in range(rounds):
         source = Surface(skin, outer)

@@ -13,14 +13,15 @@ from ..progress import Progress, Work
 from .closest import Surface
 from .completion import complete_positions, sigma
 from .fine_fit import Anchors, Fitted, fine_fit
-from .openings import closed_eyes, rim_anchors, rims
+from .openings import closed_eyes, lid_margins, rim_anchors, rims
 from .refine import Pairs, refine
 from .thin_plate_spline import ThinPlateSpline, WarpChain, similarity
 
 EAR_MARKS = ("sa", "sba", "pra", "pa", "obs", "obi", "t")
 STIFF = tuple(f"{x}_{s}" for x in ("lid_upper", "lid_lower", "nostril") for s in ("l", "r"))
-CARRIED = 12.0  # mm a landmark that was not given may give way
-PICKED = 0.25  # share of a landmark's uncertainty that it may give way
+CARRIED = 60.0  # smoothing of the first warp at a landmark that was not given, mm
+PICKED = 1.0  # the same at a given one, per mm of its uncertainty
+LID_MARKS = ("ps_l", "ps_r", "pi_l", "pi_r")
 HOLD = 0.15  # weight in the last stage of a landmark picked to 1 mm, against 1 for a point of data
 
 
@@ -32,6 +33,7 @@ class SkinFit:
     fitted : the skin after the last stage
     landmarks : name -> (3,) mm, given and completed targets
     outer (t, 3) : triangles a scanner can see; target : the scan as used (turned if it was inside out)
+    closed : sides ("l", "r") of closed eyes
     """
 
     chain: WarpChain
@@ -39,6 +41,7 @@ class SkinFit:
     landmarks: dict[str, np.ndarray]
     outer: np.ndarray
     target: Surface
+    closed: list[str]
 
 
 def group(head: Head, name: str) -> np.ndarray:
@@ -71,18 +74,25 @@ def fit_skin(reference: Head, target: Surface, given: dict[str, np.ndarray]) -> 
     marks = rows @ skin.vertices
     landmarks = complete_positions(dict(zip(names, marks, strict=True)), given)
     goal = np.array([landmarks[name] for name in names])
-    give = np.array([PICKED * sigma(name) if name in given else CARRIED for name in names])
+    known = np.array([name in given for name in names])
+    give = np.where(known, [PICKED * sigma(name) for name in names], CARRIED)
+    rim = rims(reference)
+    turn, _ = similarity(marks, goal)
+    closed = closed_eyes(reference, landmarks, given)
+    margin, margin_goal = lid_margins(reference, rim, given, turn, closed)
+    give[np.isin(names, LID_MARKS) & known] += CARRIED * (len(margin) > 0)
+    give = np.concatenate([give, np.full(len(margin), PICKED)])
 
     yield Progress(0.0, "Warp to the landmarks")
-    first = ThinPlateSpline.fit(marks, goal, give)
+    aim = np.concatenate([goal, margin_goal])
+    first = ThinPlateSpline.fit(np.concatenate([marks, skin.vertices[margin]]), aim, give)
     chain = WarpChain((first,))
     moved = first.transform(skin.vertices)
     target = facing_out(target, moved, outer)
     # Landmarks that were not given are where the skin is now; data will move them.
-    known = np.array([name in given for name in names])
-    now = rows @ moved
-    pairs = Pairs(now, np.where(known[:, None], goal, now), give)
-    rim = rims(reference)
+    now = np.concatenate([rows @ moved, moved[margin]])
+    aim[: len(names)] = np.where(known[:, None], goal, now[: len(names)])
+    pairs = Pairs(now, aim, give, len(names))
     calm = refinable(reference, outer, rim)
     work = refine(moved, calm, target, feature_triangles(reference, names), pairs)
     warps = None
@@ -97,13 +107,15 @@ def fit_skin(reference: Head, target: Surface, given: dict[str, np.ndarray]) -> 
         moved = warp.transform(moved)
 
     free, stiffness = freedom(reference, given, rim)
-    weight = np.array([HOLD / sigma(name) ** 2 if name in given else 0.0 for name in names])
+    weight = np.where(known, [HOLD / sigma(name) ** 2 for name in names], 0.0)
+    weight[np.isin(names, LID_MARKS)] *= 0.1 if len(margin) else 1.0
     matrix, _ = similarity(skin.vertices, moved)
-    together = rim_anchors(reference, rim, matrix, closed_eyes(reference, landmarks, given))
+    together = rim_anchors(reference, rim, matrix, closed)
+    on_margin = csr_matrix((np.ones(len(margin)), (np.arange(len(margin)), margin)), shape=(len(margin), n))
     anchors = Anchors(
-        vstack([rows, together.sampling]).tocsr(),
-        np.concatenate([goal, together.target]),
-        np.concatenate([weight, together.weight]),
+        vstack([rows, on_margin, together.sampling]).tocsr(),
+        np.concatenate([goal, margin_goal, together.target]),
+        np.concatenate([weight, np.full(len(margin), HOLD), together.weight]),
     )
     work = fine_fit(moved, skin.faces, triangles, free, target, anchors, stiffness)
     fitted = None
@@ -112,7 +124,7 @@ def fit_skin(reference: Head, target: Surface, given: dict[str, np.ndarray]) -> 
             yield Progress(0.4 + 0.6 * next(work), "Reach the scan")
         except StopIteration as stop:
             fitted = stop.value
-    return SkinFit(chain, fitted, landmarks, outer, target)
+    return SkinFit(chain, fitted, landmarks, outer, target, closed)
 
 
 def feature_triangles(reference: Head, names) -> np.ndarray:
@@ -131,10 +143,12 @@ def facing_out(target: Surface, skin: np.ndarray, outer: np.ndarray) -> Surface:
 
 
 def refinable(reference: Head, outer: np.ndarray, rim: np.ndarray) -> np.ndarray:
-    """The triangles of ``outer`` on which refinement may place landmarks: neither rims nor ears, whose folds lie closer
-    together than the feature mesh can tell apart."""
-    ear = np.maximum(group(reference, "ear_l"), group(reference, "ear_r")) > 0.3
-    return outer[~(rim | ear)[outer].any(axis=1)]
+    """The triangles of ``outer`` on which refinement may place landmarks: not on rims, nostrils and ears, whose folds
+    lie closer together than the feature mesh can tell apart."""
+    folds = rim.copy()
+    for name in ("ear_l", "ear_r", "nostril_l", "nostril_r"):
+        folds |= group(reference, name) > 0.3
+    return outer[~folds[outer].any(axis=1)]
 
 
 def freedom(reference: Head, given, rim):
