@@ -6,8 +6,8 @@
 The peer is ``trimesh.registration.nricp_amberg`` (Amberg, Romdhani and Vetter 2007) with the same template, scan and
 landmarks. It yields a skin only, so ratios are to our skin alone; the whole head adds skull, muscles, eyes and teeth.
 Errors are in the face, where a scanner sees it: ``scan`` is the distance of the template's vertices to the scan,
-``truth`` to the point of the noise-free subject that each of them should have found. Times compare within a run only. Prints a
-table and, on the last line, the same as JSON.
+``truth`` to the point of the noise-free subject that each of them should have found. Times compare within a run only.
+Prints a table and, on the last line, the same as JSON.
 """
 
 import argparse
