@@ -13,7 +13,7 @@ RADIUS = 12.0
 GAP = 0.25
 
 #: Ring of the eye's hole that is the inner edge of the lid margin.
-MARGIN = 5
+MARGIN = 6
 
 
 def eye_frames(vertices: np.ndarray) -> tuple[Eye, Eye]:

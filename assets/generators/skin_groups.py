@@ -82,7 +82,7 @@ def _jaw(p: _Painter) -> np.ndarray:
         (p.grid(0, 6, 22, 25), 1),
         (p.grid(7, 10, 23, 25), 1),
         (p.grid(11, 13, 23, 25), 0.8),
-        (p.ring("mouth", 3, 6, (3, 19)), 0.5),
+        (p.ring("mouth", 3, 7, (3, 19)), 0.5),
         (p.layout.patches["mouth"][0], 0),
         (p.layout.patches["mouth"][1], 0.5),
         (p.layout.patches["mouth"][2], 1),
@@ -98,10 +98,10 @@ def skin_groups(layout: Layout, vertices: np.ndarray) -> dict[str, np.ndarray]:
     ears = np.concatenate([p.ring("ear_l", 0, None), p.ring("ear_r", 0, None)])
     rest = [p.layout.crown.ravel(), p.grid(0, HALF, 0, 1), p.grid(0, HALF, 27, ROWS), p.grid(15, HALF, 0, ROWS), ears]
     out["face"] = p.field((np.concatenate(rest), 0), (np.concatenate(front), 1))
-    inner = [p.ring("mouth", 6, None)]
-    inner += [p.ring("eye" + s, 6, None) for s in ("_l", "_r")] + [p.ring("nostril" + s, 2, None) for s in ("_l", "_r")]
+    inner = [p.ring("mouth", 7, None)]
+    inner += [p.ring("eye" + s, 7, None) for s in ("_l", "_r")] + [p.ring("nostril" + s, 2, None) for s in ("_l", "_r")]
     out["inner"] = p.patch((np.concatenate(inner), 1), rounds=0)
-    out["mouth_bag"] = p.patch((p.ring("mouth", 7, None), 1), (p.ring("mouth", 6, 6), 0.5), rounds=0)
+    out["mouth_bag"] = p.patch((p.ring("mouth", 8, None), 1), (p.ring("mouth", 7, 7), 0.5), rounds=0)
     head = np.concatenate([p.layout.crown.ravel(), p.grid(0, HALF, 0, 24), *front, ears])
     out["neck"] = p.field(
         (p.grid(0, HALF, 0, 20), 0), (p.grid(0, 12, 0, 25), 0), (head, 0), (p.grid(0, HALF, 28, ROWS), 1)
@@ -113,14 +113,15 @@ def skin_groups(layout: Layout, vertices: np.ndarray) -> dict[str, np.ndarray]:
     )  # fmt: skip
     for side, indices in (("upper", range(20, 35)), ("lower", range(4, 19))):
         out["lip_" + side] = p.patch(
-            (p.ring("mouth", 2, 2, indices), 0.35), (p.ring("mouth", 3, 6, indices), 1), (p.ring("mouth", 3, 6, (3, 19)), 0.5),
+            (p.ring("mouth", 2, 2, indices), 0.35), (p.ring("mouth", 3, 7, indices), 1), (p.ring("mouth", 3, 7, (3, 19)), 0.5),
             rounds=0,
         )  # fmt: skip
     for s, sides in (("_l", (1,)), ("_r", (-1,))):
         for side, indices in (("upper", range(15, 26)), ("lower", range(3, 14))):
             out[f"lid_{side}{s}"] = p.patch(
-                (p.ring("eye" + s, 1, 1, indices), 0.2), (p.ring("eye" + s, 2, 2, indices), 0.7),
-                (p.ring("eye" + s, 3, 6, indices), 1), (p.ring("eye" + s, 2, 6, (2, 14)), 0.5), rounds=0,
+                (p.ring("eye" + s, 1, 1, indices), 0.15), (p.ring("eye" + s, 2, 2, indices), 0.5),
+                (p.ring("eye" + s, 3, 3, indices), 0.85), (p.ring("eye" + s, 4, 7, indices), 1),
+                (p.ring("eye" + s, 2, 7, (2, 14)), 0.5), rounds=0,
             )  # fmt: skip
         out["brow" + s] = p.patch((p.grid(2, 11, 4, 4, sides), 0.9), (p.grid(3, 11, 5, 5, sides), 1), rounds=2)
         out["cheek" + s] = p.patch((p.grid(6, 12, 11, 20, sides), 1), rounds=4)

@@ -13,11 +13,11 @@ PLACES = {
     "sn": (0, 15),
     "ls": ("mouth", 3, 27),
     "li": ("mouth", 3, 11),
-    "sto": ("mouth", 5, 27),
-    "en": ("eye_l", 4, 2),
-    "ex": ("eye_l", 4, 14),
-    "ps": ("eye_l", 4, 20),
-    "pi": ("eye_l", 4, 8),
+    "sto": ("mouth", 6, 27),
+    "en": ("eye_l", 5, 2),
+    "ex": ("eye_l", 5, 14),
+    "ps": ("eye_l", 5, 20),
+    "pi": ("eye_l", 5, 8),
     "ch": ("mouth", 3, 19),
 }
 

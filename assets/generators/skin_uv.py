@@ -53,7 +53,7 @@ def skin_uv(layout: Layout, vertices: np.ndarray) -> np.ndarray:
     """(m, 4, 2) float32 per face corner, 0..1; the two sides are mirror images about u = 0.5."""
     faces = layout.faces
     uv = np.full((len(faces), 4, 2), np.nan)
-    cups = {"mouth": 6, "eye_l": 5, "eye_r": 5, "nostril_l": 1, "nostril_r": 1}
+    cups = {"mouth": 7, "eye_l": 6, "eye_r": 6, "nostril_l": 1, "nostril_r": 1}
     cup_of = np.full(layout.count, "", dtype=object)
     for hole, first in cups.items():
         cup_of[layout.rings[hole][first + 1 :]] = hole
@@ -65,8 +65,8 @@ def skin_uv(layout: Layout, vertices: np.ndarray) -> np.ndarray:
     left = outer[(layout.mirror[faces[outer]] >= faces[outer]).all(axis=1)]
     middle = layout.crown.shape[1] // 2
     seam_top = layout.crown[:, middle]  # front to back over the crown
-    front = np.r_[seam_top[middle::-1], layout.grid[1:16, 0], layout.rings["mouth"][1:7, 27]]
-    below = np.r_[layout.rings["mouth"][6:0:-1, 11], layout.grid[22:, 0]]
+    front = np.r_[seam_top[middle::-1], layout.grid[1:16, 0], layout.rings["mouth"][1:8, 27]]
+    below = np.r_[layout.rings["mouth"][7:0:-1, 11], layout.grid[22:, 0]]
     neck = layout.grid[-1, 0 : HALF + 1]
     back = np.r_[layout.grid[:0:-1, HALF], seam_top[:middle:-1]]
 
@@ -118,11 +118,11 @@ def skin_uv(layout: Layout, vertices: np.ndarray) -> np.ndarray:
         own = np.flatnonzero(hole_of_face == hole)
         if hole == "mouth":
             own = own[(layout.mirror[faces[own]] >= faces[own]).all(axis=1)]
-            rim = layout.rings["mouth"][6, 11:28]
+            rim = layout.rings["mouth"][7, 11:28]
             angle = np.linspace(-np.pi / 2, np.pi / 2, len(rim))
             where = np.asarray((0.972, 0.60)) + np.asarray((0.025, 0.15)) * np.stack([np.cos(angle), np.sin(angle)], 1)
             chord = np.r_[
-                layout.rings["mouth"][7:, 27], layout.patches["mouth"][1, 7], layout.rings["mouth"][:6:-1, 11]
+                layout.rings["mouth"][8:, 27], layout.patches["mouth"][1, 7], layout.rings["mouth"][:7:-1, 11]
             ]
             line = np.asarray((0.972, 0.60)) + np.stack(
                 [np.zeros(len(chord)), np.linspace(0.15, -0.15, len(chord) + 2)[1:-1]], 1
