@@ -58,7 +58,7 @@ def clean_scan(mesh: Mesh) -> tuple[Mesh, dict]:
     flat = _flat(points, triangles)
     counts["zero_area_faces"] = int(flat.sum())
     triangles = triangles[~flat]
-    again = _repeated(triangles, len(points))
+    again = _repeated(triangles)
     counts["duplicate_faces"] = int(again.sum())
     triangles = triangles[~again]
 
@@ -122,13 +122,7 @@ def _coincident(points):
     UV seams, STL triangles and merged sheets repeat positions bit by bit. One sort of a 64-bit mix of the coordinates
     is far faster than sorting rows; neighbours in it are then compared for real.
     """
-    bits = (points + 0.0).view(np.uint64)  # + 0.0 turns -0 into 0
-    key = np.zeros(len(points), dtype=np.uint64)
-    for axis in range(3):
-        key ^= bits[:, axis]
-        key *= np.uint64(0x9E3779B97F4A7C15)
-        key ^= key >> np.uint64(29)
-    order = np.argsort(key, kind="stable")
+    order = np.argsort(_mixed(np.ascontiguousarray(points.T) + 0.0), kind="stable")  # + 0.0 turns -0 into 0
     new = np.ones(len(points), dtype=bool)
     new[1:] = (points[order[1:]] != points[order[:-1]]).any(axis=1)
     first = order[np.maximum.accumulate(np.where(new, np.arange(len(points)), 0))]  # the first vertex of each place
@@ -155,11 +149,23 @@ def _flat(points, triangles):
     return np.linalg.norm(np.cross(ab, ac), axis=1) <= FLAT * longest
 
 
-def _repeated(triangles, vertex_count):
+def _repeated(triangles):
     """True for each triangle whose three corners were seen before, in any order."""
-    low, mid, high = np.sort(triangles, axis=1).T.astype(np.int64)
-    order = np.lexsort((high, low * vertex_count + mid))
-    rows = np.stack([low, mid, high], axis=1)[order]
+    a, b, c = triangles.T.astype(np.int64)
+    low, high = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
+    rows = np.stack([low, a + b + c - low - high, high])
+    order = np.argsort(_mixed(rows), kind="stable")
+    rows = rows[:, order]
     again = np.zeros(len(triangles), dtype=bool)
-    again[order[1:]] = (rows[1:] == rows[:-1]).all(axis=1)
+    again[order[1:]] = (rows[:, 1:] == rows[:, :-1]).all(axis=0)
     return again
+
+
+def _mixed(columns):
+    """One 64-bit number per item from columns (k, n) of 64-bit ones; equal items get equal numbers."""
+    key = np.zeros(columns.shape[1], dtype=np.uint64)
+    for column in columns:
+        key ^= column.view(np.uint64)
+        key *= np.uint64(0x9E3779B97F4A7C15)
+        key ^= key >> np.uint64(29)
+    return key

@@ -9,6 +9,8 @@ from ..mesh import Mesh
 
 #: Points of the template in the first and in the last rounds.
 FEW, MANY = 140, 450
+#: More vertices than this say no more about where the face is.
+PLENTY = 200_000
 #: Part of the template that must find the scan: the rest may lie over holes.
 TRIM = 0.8
 #: Cells along the scan's largest extent in the first and in the last rounds.
@@ -21,7 +23,10 @@ def surface_samples(mesh: Mesh) -> np.ndarray:
     """Vertices of the faces and, of a coarse mesh, the middles of faces and their sides (k, 3); NaN left out."""
     triangles = mesh.triangles
     triangles = triangles[np.isfinite(mesh.vertices).all(axis=1)[triangles].all(axis=1)]
-    out = [mesh.vertices[np.unique(triangles)]]
+    used = np.zeros(len(mesh.vertices), dtype=bool)
+    used[triangles.ravel()] = True
+    points = mesh.vertices[used]
+    out = [points[:: 1 + len(points) // PLENTY]]
     if len(triangles) < 60_000:
         a, b, c = (mesh.vertices[triangles[:, k]] for k in range(3))
         out += [(a + b + c) / 3, (a + b) / 2, (b + c) / 2, (c + a) / 2]
