@@ -39,9 +39,8 @@ def parser() -> argparse.ArgumentParser:
     reading = argparse.ArgumentParser(add_help=False)
     reading.add_argument("scan", metavar="SCAN", help="PLY, OBJ, STL, glTF, USD or FBX")
     reading.add_argument("--units", choices=("mm", "cm", "m", "in"), help="the scan's unit (default: detected)")
-    reading.add_argument(
-        "--up", choices=("X", "Y", "Z", "-X", "-Y", "-Z"), help="the scan's up axis (default: detected)"
-    )
+    up = "the scan's up axis: X, Y, Z or, written --up=-Z, one upside down (default: detected)"
+    reading.add_argument("--up", choices=("X", "Y", "Z", "-X", "-Y", "-Z"), metavar="AXIS", help=up)
 
     commands = program.add_subparsers(dest="command", metavar="COMMAND", parser_class=_Parser)
 

@@ -196,7 +196,10 @@ def _save(path: Path) -> None:
     from .quiet import quiet
 
     with quiet():
-        bpy.ops.wm.save_as_mainfile(filepath=str(path.resolve()), check_existing=False, compress=True, copy=True)
+        try:
+            bpy.ops.wm.save_as_mainfile(filepath=str(path.resolve()), check_existing=False, compress=True, copy=True)
+        except RuntimeError as error:
+            raise InputError(f"{path.name} cannot be written ({error}): is the disk full?") from error
 
 
 def _run(work, options):
