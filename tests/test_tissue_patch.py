@@ -138,8 +138,8 @@ def test_fascia_slides_on_bone_and_never_enters(model):
     x = pose.reference.copy()
     n = model.count
     node = n + np.argmin(np.abs(x[n : 2 * n, :2]).sum(axis=1))
-    bone = contact.bone_planes(model.layers, x[2 * n :], np.eye(3), model.cache["matrix"]["margin"])
     x[node] += [2.0, 0, 0]
+    bone = contact.bone_planes(model.contacts.bones, model.layers, x[n : 2 * n], np.eye(3), np.zeros(3))
     assert planes.depths(bone, x).max() == 0
     x[node] += [0, 0, -6.0]
     energy, gradient = planes.contact_energy(bone, x, 10.0)

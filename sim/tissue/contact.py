@@ -23,6 +23,18 @@ _LIP_REACH = 6.0
 
 
 @dataclass(frozen=True, eq=False)
+class Bone:
+    """column (c,) skin columns on this bone, margin (c,) mm their fascia keeps; points, normal (k, 3)."""
+
+    column: np.ndarray
+    margin: np.ndarray
+    points: np.ndarray
+    normal: np.ndarray
+    tree: cKDTree
+    lower: bool
+
+
+@dataclass(frozen=True, eq=False)
 class Surfaces:
     """What may touch. arches: the dental arches; lip_upper, lip_lower: columns of the two lips.
 
@@ -30,6 +42,7 @@ class Surfaces:
     """
 
     arches: tuple[Arch, ...]
+    bones: tuple[Bone, ...]
     lip_upper: np.ndarray
     lip_lower: np.ndarray
     sheets: np.ndarray
@@ -49,6 +62,7 @@ def build_surfaces(head: Head, layers: Layers, ties: np.ndarray) -> Surfaces:
     )
     return Surfaces(
         arches=build_arches(head, layers),
+        bones=build_bones(head, layers),
         lip_upper=np.flatnonzero((lip_u > 0.3) & free),
         lip_lower=np.flatnonzero((lip_l > 0.3) & free),
         sheets=ties[apart > 0.1],
@@ -57,23 +71,55 @@ def build_surfaces(head: Head, layers: Layers, ties: np.ndarray) -> Surfaces:
     )
 
 
-def bone_planes(layers: Layers, bone: np.ndarray, mandible_rotation: np.ndarray, rest_margin: np.ndarray) -> Planes:
-    """Fascia over bone: planes at the posed bone nodes ``bone`` (n, 3), their normals turned with the mandible."""
-    n = len(layers.area)
-    column = np.flatnonzero(layers.bony & layers.free[:n])
-    normal = layers.bone_normal[column]
-    turned = normal @ mandible_rotation.T
-    w = layers.mandible[column, None]
-    normal = (1 - w) * normal + w * turned
-    level = np.einsum("ij,ij->i", bone[column], normal) + rest_margin[column]
-    return Planes(column + n, normal, level, np.full(len(column), -1))
+def bone_planes(model_bones, layers: Layers, fascia: np.ndarray, rotation, translation) -> Planes:
+    """Fascia (n, 3) over bone (3.7): the tangent plane of the bone where each node is now, so that it slides along it.
+
+    The mandible's columns are looked up in the mandible's own frame. Where the nearest bone faces another way than the
+    bone the column stands on (the inside of an orbit, the edge of a plate) there is no contact.
+    """
+    node, normal, level = [], [], []
+    for bone in model_bones:
+        points = fascia[bone.column]
+        if bone.lower:
+            points = (points - translation) @ rotation
+        _, near = bone.tree.query(points)
+        n = bone.normal[near]
+        keep = np.einsum("ij,ij->i", n, layers.bone_normal[bone.column]) > 0.5
+        at = bone.points[near]
+        if bone.lower:
+            at, n = at @ rotation.T + translation, n @ rotation.T
+        node.append(bone.column[keep] + len(fascia))
+        normal.append(n[keep])
+        level.append((np.einsum("ij,ij->i", at, n) + bone.margin)[keep])
+    if not node:
+        return empty_planes()
+    node, normal, level = (np.concatenate(x) for x in (node, normal, level))
+    return Planes(node, normal, level, np.full(len(node), -1))
 
 
-def bone_margin(layers: Layers) -> np.ndarray:
-    """(n,) mm that fascia must keep over its bone: 0.3 or what the rest shape has."""
+def build_bones(head: Head, layers: Layers) -> tuple[Bone, ...]:
+    """Skull and mandible as point samples with outward normals, and the columns that stand on them."""
     n = len(layers.area)
-    gap = np.einsum("ij,ij->i", layers.nodes[n : 2 * n] - layers.nodes[2 * n :], layers.bone_normal)
-    return np.minimum(gap, 0.3)
+    bones = []
+    for lower, part in ((False, "skull"), (True, "mandible")):
+        column = np.flatnonzero(layers.bony & layers.free[:n] & ((layers.mandible > 0.5) == lower))
+        if not len(column):
+            continue
+        mesh = head.parts[part]
+        tri = mesh.triangles
+        at_vertex = vertex_normals(mesh.vertices, tri)
+        points = np.concatenate([mesh.vertices, mesh.vertices[tri].mean(axis=1)])
+        normal = np.concatenate([at_vertex, at_vertex[tri].mean(axis=1)])
+        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-9)
+        near = cKDTree(points).query(layers.nodes[2 * n :][column])[1]
+        if np.einsum("ij,ij->i", normal[near], layers.bone_normal[column]).mean() < 0:  # wound inside out
+            normal = -normal
+        tree = cKDTree(points)
+        fascia = layers.nodes[n : 2 * n][column]
+        near = tree.query(fascia)[1]
+        gap = np.einsum("ij,ij->i", fascia - points[near], normal[near])
+        bones.append(Bone(column, np.minimum(gap, 0.3), points, normal, tree, lower))
+    return tuple(bones)
 
 
 def eye_planes(lids, positions: np.ndarray, gaze: np.ndarray) -> Planes:

@@ -16,7 +16,8 @@ def diagnose(model: Model, pose, positions, planes, energy, residual) -> dict:
     n = model.count
     volume = prism_volumes(positions, model.prisms) if len(model.prisms) else np.ones(1)
     rest = model.prism_volume if len(model.prisms) else np.ones(1)
-    bone = contact.bone_planes(model.layers, pose.reference[2 * n :], pose.rotation, model.cache["matrix"]["margin"])
+    fascia = positions[n : 2 * n]
+    bone = contact.bone_planes(model.contacts.bones, model.layers, fascia, pose.rotation, pose.translation)
     moved = np.linalg.norm(positions[:n] - model.layers.nodes[:n], axis=1)
     eye = 0.0
     for lids in model.lids:

@@ -115,7 +115,6 @@ def system_matrix(model: Model) -> dict:
         "system": full[free][:, free].tocsc(),
         "free": free,
         "gather": corner_gather(model.prisms, 3 * n),
-        "margin": contact.bone_margin(layers),
     }
 
 
@@ -155,9 +154,8 @@ def find_contacts(model: Model, pose: Pose, positions) -> Planes:
     """The planes that matter near ``positions`` (3 n, 3)."""
     n = model.count
     rest = model.layers.nodes[:n]
-    bone = pose.reference[2 * n :]
     return joined(
-        contact.bone_planes(model.layers, bone, pose.rotation, model.cache["matrix"]["margin"]),
+        contact.bone_planes(model.contacts.bones, model.layers, positions[n : 2 * n], pose.rotation, pose.translation),
         *(contact.eye_planes(lids, positions[:n], pose.gaze) for lids in model.lids),
         arch.arch_contacts(model.contacts, positions[:n], pose.rotation, pose.translation),
         contact.sheet_contacts(model.contacts, positions[:n]),

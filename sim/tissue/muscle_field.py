@@ -18,6 +18,8 @@ JAW_MUSCLES = ("masseter", "temporalis", "pterygoideus_medialis", "pterygoideus_
 #: Muscles whose work `lids` does as a turn of the lid over the eyeball.
 LID_MUSCLES = ("levator_palpebrae", "orbicularis_oculi_palpebral", "orbicularis_oculi_lacrimal")
 _LIDS = ("upper_l", "upper_r", "lower_l", "lower_r")
+#: Half the width over which a single fibre takes hold of the fascia, mm: about one mesh of the skin and a half.
+_NARROWEST = 7.5
 _DEPTH = 16.0  # mm between a fibre and the fascia it may still move
 
 
@@ -68,7 +70,7 @@ def _linear(muscle: Muscle, points, normals):
     spacing = muscle.width / max(len(fibres), 1)
     for fibre in fibres:
         epsilon, omega, deep, toward = fibre_coordinates(points, normals, fibre)
-        reach = max(spacing, 5.0) + 4.0
+        reach = max(spacing, _NARROWEST) + 0.5 * _NARROWEST
         w = theta_1(epsilon) * theta_2(omega / reach) * (np.abs(deep) < _DEPTH)
         weight = np.maximum(weight, w)
         direction += w[:, None] * toward
@@ -107,6 +109,8 @@ def _arc(muscle: Muscle, points, normals):
     across = inward[:, 0] / half
     direction = np.zeros_like(points)
     direction[:, 0] = np.sign(across) * np.clip(np.abs(across), 0, 1)
+    # towards the line between the lips, which contact keeps apart
+    direction[:, 2] = 0.45 * np.sign(inward[:, 2]) * np.clip(np.abs(inward[:, 2]) / 4, 0, 1)
     direction[:, 1] = -0.75 * (1 - 0.6 * np.clip(np.abs(across), 0, 1) ** 2)  # forward
     return weight, direction
 
@@ -130,7 +134,7 @@ def build_muscle_field(head: Head, layers: Layers, table: dict) -> MuscleField:
         goal = float(row.get("excursion_mm", 4.0)) if moves else 0.0
         length = float(np.linalg.norm(np.diff(muscle.path, axis=0), axis=1).sum())
         excursion.append(goal)
-        reach.append(np.clip(muscle.max_shortening * length, 1.5 * goal, 2.5 * goal) if goal else 1.0)
+        reach.append(np.clip(muscle.max_shortening * length, 1.8 * goal, 3.0 * goal) if goal else 1.0)
         if not moves:
             continue
         if muscle.ring:
@@ -141,6 +145,9 @@ def build_muscle_field(head: Head, layers: Layers, table: dict) -> MuscleField:
             w, d = _linear(muscle, fascia[usable], normals)
         w = w * spare
         keep = w > 0.02
+        # 3.7: what would press fascia into the bone under it is cancelled; it slides
+        pressing = np.minimum(np.einsum("ij,ij->i", d, layers.bone_normal[usable]), 0) * layers.bony[usable]
+        d = d - pressing[:, None] * layers.bone_normal[usable]
         size = np.linalg.norm(d, axis=1, keepdims=True)
         unit = d / np.maximum(size, 1e-9)
         if muscle.kind == "sphincter" and not muscle.ring:
