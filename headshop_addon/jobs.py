@@ -25,6 +25,7 @@ class Running:
     """The job in progress, for the sidebar."""
 
     title: str
+    panel: str = ""
     fraction: float = 0.0
     label: str = ""
 
@@ -58,6 +59,8 @@ class Simple:
 class Job:
     """Mixin of long operators: write ``work(context)``, a generator, and ``finish(context, result)``."""
 
+    #: The panel that shows the progress.
+    panel = ""
     _work: Work | None = None
     _timer = None
 
@@ -88,7 +91,7 @@ class Job:
             self.report({"WARNING"}, f"{running.title} is still running: wait, or press Esc to cancel it.")
             return {"CANCELLED"}
         self._work = self.work(context)
-        running = Running(self.bl_label)
+        running = Running(self.bl_label, self.panel)
         manager = context.window_manager
         self._timer = manager.event_timer_add(0.01, window=context.window)
         manager.modal_handler_add(self)

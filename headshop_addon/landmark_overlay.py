@@ -63,7 +63,7 @@ def _chosen(context) -> str:
     if asked_for:
         return asked_for
     group = active.scan(context).headshop
-    return group.landmarks[group.landmark_index].name if group.landmark_index < len(group.landmarks) else ""
+    return group.landmarks[group.landmark_index].name if 0 <= group.landmark_index < len(group.landmarks) else ""
 
 
 def _discs(shader, batch_for_shader, centres, radius, colour):

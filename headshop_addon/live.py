@@ -18,9 +18,11 @@ from ..sim.errors import InputError
 from . import bridge, dependencies, heads, jobs, muscle_names
 
 KEY = "Live"
-#: Solver iterations for one look while a slider is dragged or the time line plays; a timer adds as many at a time
-#: until the face rests. Without a window the face is brought to rest at once.
-LOOK, REST = 10, 60
+#: Solver iterations for one look while a slider is dragged or the time line plays, and for each round of the timer that
+#: brings the face to rest afterwards. Without a window the face is brought to rest at once.
+LOOK, ROUND, REST = 10, 25, 60
+#: The timer stops when a round moves no vertex by more than this (mm), or after so many rounds.
+VISIBLE, ROUNDS = 0.05, 12
 STILL = 0.001  # mm: a part that never moved more needs no key
 
 _depth = 0  # > 0 while nothing must follow
@@ -36,6 +38,7 @@ class _Following:
     state: Any
     pose: tuple | None = None
     settled: bool = True
+    rounds: int = 0
 
 
 _following: dict[int, _Following] = {}
@@ -121,21 +124,29 @@ def follow(skin, depsgraph=None) -> None:
             _following.pop(skin.session_uid, None)
             return
     waiting = following is not None and not following.settled and not bpy.app.background
-    if waiting and not bpy.app.timers.is_registered(_settle):
-        bpy.app.timers.register(_settle, first_interval=0.05)
+    if waiting:
+        following.rounds = 0
+        if not bpy.app.timers.is_registered(_settle):
+            bpy.app.timers.register(_settle, first_interval=0.2)
 
 
 def _settle():
-    """Timer: some more iterations for every face that is not at rest; nothing while a job runs or the time line plays."""
-    if jobs.running is not None or any(
-        window.screen.is_animation_playing for window in bpy.context.window_manager.windows
-    ):
+    """Timer: another round for every face that is not at rest; nothing while a job runs or the time line plays."""
+    windows = bpy.context.window_manager.windows
+    if jobs.running is not None or any(window.screen.is_animation_playing for window in windows):
         return 0.3
     for skin in heads.find_heads(bpy.context.scene):
-        if (following := _following.get(skin.session_uid)) is not None and not following.settled:
-            following.pose = None
-            follow(skin)
-    return 0.02 if any(not following.settled for following in _following.values()) else None
+        following = _following.get(skin.session_uid)
+        if following is None or following.settled or not skin.headshop.live:
+            continue
+        before = following.state.skin
+        following.pose, following.rounds = None, following.rounds + 1
+        with paused():
+            _solve(skin, sliders(skin), ROUND)
+        still = np.abs(following.state.skin - before).max(initial=0.0) < VISIBLE
+        following.settled = following.settled or still or following.rounds >= ROUNDS
+    waiting = any(not following.settled for following in _following.values())
+    return 0.02 if waiting else None
 
 
 def _solve(skin, values, iterations) -> _Following | None:

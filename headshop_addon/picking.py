@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""From the mouse to a point on a surface."""
+"""From the mouse to a point on a scan, which may have a hole right there."""
+
+import math
+from statistics import median
 
 from bpy_extras.view3d_utils import region_2d_to_origin_3d, region_2d_to_vector_3d
 
@@ -16,13 +19,39 @@ def viewport_region(area, x: int, y: int):
     return inside[0] if inside else None
 
 
+#: Pixels around the mouse that are looked at where the scan has a hole, and how much farther than they (m) a hit must
+#: be to count as one through a hole, on the far side of the head.
+_RINGS, _THROUGH = (5.0, 10.0, 18.0), 0.02
+
+
 def on_surface(context, area, region, at, obj):
-    """The point of ``obj``'s surface under a region position, in the object's own space; None where there is none."""
+    """The point of ``obj``'s surface under a region position, in the object's own space; None where there is none.
+
+    In a hole it is the point under the mouse at the depth of the hole's rim: a landmark may lie in mid-air.
+    """
     view = area.spaces.active.region_3d
-    origin = region_2d_to_origin_3d(region, view, at)
-    direction = region_2d_to_vector_3d(region, view, at)
     to_local = obj.matrix_world.inverted_safe()
-    start = to_local @ origin
-    along = (to_local.to_3x3() @ direction).normalized()
-    hit, point, _normal, _face = obj.ray_cast(start, along, depsgraph=context.evaluated_depsgraph_get())
-    return point if hit else None
+    turn = to_local.to_3x3()
+    graph = context.evaluated_depsgraph_get()
+
+    def ray(dx, dy):
+        where = (at[0] + dx, at[1] + dy)
+        start = to_local @ region_2d_to_origin_3d(region, view, where)
+        return start, (turn @ region_2d_to_vector_3d(region, view, where)).normalized()
+
+    def depth(dx, dy):
+        start, along = ray(dx, dy)
+        hit, point, _normal, _face = obj.ray_cast(start, along, depsgraph=graph)
+        return (point - start).length if hit else None
+
+    start, along = ray(0, 0)
+    found = depth(0, 0)
+    for radius in _RINGS:
+        turns = [k * math.tau / 8 for k in range(8)]
+        around = [depth(radius * math.cos(a), radius * math.sin(a)) for a in turns]
+        rim = [d for d in around if d is not None]
+        if len(rim) >= 3:
+            if found is None or found > median(rim) + _THROUGH:
+                found = median(rim)
+            break
+    return None if found is None else start + along * found

@@ -15,7 +15,7 @@ class HEADSHOP_AP_preferences(bpy.types.AddonPreferences):
         name="Landmark Size", description="Size of landmark points in the viewport", default=9.0, min=3.0, max=30.0
     )
     text_size: bpy.props.IntProperty(
-        name="Text Size", description="Size of landmark names in the viewport", default=12, min=6, max=40
+        name="Text Size", description="Size of landmark names in the viewport", default=11, min=6, max=40
     )
 
     def draw(self, context):

@@ -59,7 +59,7 @@ def _slider(label: str, description: str, lowest: float):
         default=0.0,
         precision=2,
         step=1,
-        subtype="FACTOR",
+        subtype="FACTOR" if lowest == 0.0 else "NONE",  # a bar half full would not look like rest
         options={"ANIMATABLE"},
         override={"LIBRARY_OVERRIDABLE"},
         update=live.on_slider,
@@ -78,7 +78,7 @@ class HEADSHOP_PG_object(bpy.types.PropertyGroup):
     """Landmarks of a scan; sliders of a head's skin."""
 
     landmarks: CollectionProperty(type=HEADSHOP_PG_landmark)
-    landmark_index: IntProperty(name="Landmark", description="The landmark chosen in the list")
+    landmark_index: IntProperty(name="Landmark", description="The landmark chosen in the list", default=-1)
     muscles: PointerProperty(type=HEADSHOP_PG_muscles, override={"LIBRARY_OVERRIDABLE"})
     controls: PointerProperty(type=HEADSHOP_PG_controls, override={"LIBRARY_OVERRIDABLE"})
     live: BoolProperty(

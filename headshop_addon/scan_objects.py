@@ -10,7 +10,7 @@ from pathlib import Path
 
 import bpy
 import numpy as np
-from mathutils import Matrix
+from mathutils import Matrix, Vector
 
 from ..sim.adapt.landmarks import read_landmarks, write_landmarks
 from ..sim.anatomy.landmark_names import SKIN
@@ -55,6 +55,7 @@ def adopt(context, original: bpy.types.Object) -> bpy.types.Object:
     turn = scan.orientation.matrix  # mm to mm here: the translation is zero, so it serves for metres too
     obj.matrix_world = original.matrix_world @ Matrix(np.linalg.inv(turn).tolist())
     original.hide_set(True)
+    look_at(context)
     return obj
 
 
@@ -65,8 +66,25 @@ def _add(context, scan, name: str) -> bpy.types.Object:
     scan_landmarks.entries(obj)
     context.scene.headshop.scan = obj
     select(context, obj)
+    _clear_view(context, obj)
     look_at(context)
     return obj
+
+
+def _clear_view(context, obj) -> None:
+    """Hide meshes that stand around the scan, such as the cube of a new file: inside them it could not be seen."""
+    context.view_layer.update()
+    low, high = _bounds(obj)
+    for other in context.visible_objects:
+        if other.type == "MESH" and other is not obj:
+            a, b = _bounds(other)
+            if (a <= low).all() and (b >= high).all():
+                other.hide_set(True)
+
+
+def _bounds(obj) -> tuple[np.ndarray, np.ndarray]:
+    corners = np.array([obj.matrix_world @ Vector(corner) for corner in obj.bound_box])
+    return corners.min(axis=0), corners.max(axis=0)
 
 
 def _upright() -> Orientation:
@@ -91,6 +109,15 @@ def look_at(context) -> None:
     with context.temp_override(area=area, region=region):
         bpy.ops.view3d.view_axis(type="FRONT")
         bpy.ops.view3d.view_selected()
+
+
+def muscles_view(context, skin: bpy.types.Object) -> bpy.types.LayerCollection | None:
+    """The view layer's entry of the collection that holds a head's muscles, to show or hide them."""
+    collection = heads.head_collection(skin)
+    if collection is None:
+        return None
+    layer = context.view_layer.layer_collection.children.get(collection.name)
+    return layer.children.get(f"{collection.name} Muscles") if layer else None
 
 
 def summary(scan: bpy.types.Object) -> str:
@@ -143,6 +170,9 @@ def build(context, scan: bpy.types.Object, name: str = "") -> Work:
     )
     skin.matrix_world = scan.matrix_world
     scan.hide_set(True)
+    muscles = muscles_view(context, skin)
+    if muscles is not None:
+        muscles.hide_viewport = True  # they stay where they are when the face moves
     context.scene.headshop.head = skin
     select(context, skin)
     return skin, report

@@ -13,6 +13,7 @@ class HEADSHOP_OT_bake_expressions(Job, bpy.types.Operator):
     bl_idname = "headshop.bake_expressions"
     bl_label = "Bake Expressions"
     bl_options = {"REGISTER", "UNDO"}
+    panel = "bake"
 
     @classmethod
     def poll(cls, context):

@@ -13,6 +13,7 @@ class HEADSHOP_OT_bake_muscles(Job, bpy.types.Operator):
     bl_idname = "headshop.bake_muscles"
     bl_label = "Bake Muscles"
     bl_options = {"REGISTER", "UNDO"}
+    panel = "bake"
 
     @classmethod
     def poll(cls, context):

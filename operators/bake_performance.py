@@ -13,6 +13,7 @@ class HEADSHOP_OT_bake_performance(Job, bpy.types.Operator):
     bl_idname = "headshop.bake_performance"
     bl_label = "Bake Animation"
     bl_options = {"REGISTER", "UNDO"}
+    panel = "bake"
 
     @classmethod
     def poll(cls, context):

@@ -13,6 +13,7 @@ class HEADSHOP_OT_build_head(Job, bpy.types.Operator):
     bl_idname = "headshop.build_head"
     bl_label = "Build Head"
     bl_options = {"REGISTER", "UNDO"}
+    panel = "build"
 
     name: bpy.props.StringProperty(
         name="Name", description="Name of the head; empty: the scan's", options={"SKIP_SAVE"}

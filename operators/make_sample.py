@@ -13,6 +13,7 @@ class HEADSHOP_OT_make_sample(Job, bpy.types.Operator):
     bl_idname = "headshop.make_sample"
     bl_label = "Add Sample Scan"
     bl_options = {"REGISTER", "UNDO"}
+    panel = "scan"
 
     seed: bpy.props.IntProperty(name="Seed", description="Another number is another person", default=1, min=0)
     with_landmarks: bpy.props.BoolProperty(

@@ -14,6 +14,7 @@ class HEADSHOP_OT_render_sheet(Job, ExportHelper, bpy.types.Operator):
     bl_idname = "headshop.render_sheet"
     bl_label = "Render Sheet"
     bl_options = {"REGISTER"}
+    panel = "bake"
 
     filename_ext = ".png"
     filter_glob: bpy.props.StringProperty(default="*.png", options={"HIDDEN"})

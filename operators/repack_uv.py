@@ -3,7 +3,7 @@
 
 import bpy
 
-from ..headshop_addon import active, dependencies, polls
+from ..headshop_addon import active, polls
 from ..headshop_addon.jobs import Simple
 
 
@@ -21,11 +21,6 @@ class HEADSHOP_OT_repack_uv(Simple, bpy.types.Operator):
         min=256,
         max=16384,
     )
-
-    @classmethod
-    def description(cls, context, properties):
-        """The tooltip says what is missing."""
-        return dependencies.reason("xatlas") or cls.__doc__
 
     @classmethod
     def poll(cls, context):

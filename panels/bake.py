@@ -15,7 +15,7 @@ class HEADSHOP_PT_bake(SidebarPanel, bpy.types.Panel):
     def draw(self, context):
         """Shape keys, animation, pictures and files."""
         layout = self.layout
-        if progress(layout):
+        if progress(layout, "bake"):
             return
         skin = active.skin(context)
         if skin is None:

@@ -18,7 +18,7 @@ class HEADSHOP_PT_build(SidebarPanel, bpy.types.Panel):
     def draw(self, context):
         """One big button, then what came out of it."""
         layout = self.layout
-        if progress(layout):
+        if progress(layout, "build"):
             return
         row = layout.row()
         row.scale_y = 1.4

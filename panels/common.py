@@ -24,9 +24,10 @@ def hint(layout, context, text: str, icon: str = "INFO") -> None:
         column.label(text=line, icon=icon if number == 0 else "BLANK1")
 
 
-def progress(layout) -> bool:
-    """The progress bar of the job in progress; False where there is none."""
-    if jobs.running is None:
+def progress(layout, panel: str) -> bool:
+    """The progress bar of the job in progress, in the panel it belongs to; others are greyed out meanwhile."""
+    layout.enabled = jobs.running is None or jobs.running.panel == panel
+    if jobs.running is None or jobs.running.panel != panel:
         return False
     column = layout.column(align=True)
     column.progress(factor=jobs.running.fraction, type="BAR", text=f"{jobs.running.title}: {jobs.running.fraction:.0%}")

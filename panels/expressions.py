@@ -4,7 +4,7 @@
 import bpy
 
 from ..headshop_addon import active, dependencies
-from .common import SidebarPanel, hint
+from .common import SidebarPanel, hint, progress
 
 
 class HEADSHOP_PT_expressions(SidebarPanel, bpy.types.Panel):
@@ -15,6 +15,7 @@ class HEADSHOP_PT_expressions(SidebarPanel, bpy.types.Panel):
     def draw(self, context):
         """A button for each."""
         layout = self.layout
+        progress(layout, "expressions")
         if active.skin(context) is None:
             hint(layout, context, "Expressions need a head: build one first.")
             return

@@ -5,7 +5,7 @@ import bpy
 
 from ..headshop_addon import active, scan_landmarks
 from ..sim.anatomy.landmark_names import LABELS, SKIN, label
-from .common import SidebarPanel, hint
+from .common import SidebarPanel, hint, progress
 
 _ICONS = {"PLACED": "KEYFRAME_HLT", "DERIVED": "KEYFRAME", "MISSING": "BLANK1"}
 
@@ -28,6 +28,7 @@ class HEADSHOP_PT_landmarks(SidebarPanel, bpy.types.Panel):
     def draw(self, context):
         """Click, load, save; then the list."""
         layout, settings = self.layout, context.scene.headshop
+        progress(layout, "landmarks")
         scan = active.scan(context)
         if scan is None:
             hint(layout, context, "Landmarks are placed on a scan: import one first.")

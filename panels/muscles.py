@@ -4,7 +4,7 @@
 import bpy
 
 from ..headshop_addon import active, heads, muscle_names
-from .common import SidebarPanel, hint
+from .common import SidebarPanel, hint, progress
 
 
 class HEADSHOP_PT_muscles(SidebarPanel, bpy.types.Panel):
@@ -15,6 +15,7 @@ class HEADSHOP_PT_muscles(SidebarPanel, bpy.types.Panel):
     def draw(self, context):
         """Which head, whether it follows, and what to do with all sliders."""
         layout = self.layout
+        progress(layout, "muscles")
         skin = active.skin(context)
         if skin is None:
             hint(layout, context, "Muscles belong to a head: build one first.")
@@ -48,13 +49,13 @@ class HEADSHOP_PT_controls(_Sliders, bpy.types.Panel):
         group = active.skin(context).headshop.controls
         column = self.layout.column(align=True)
         for name in ("jaw_open", "jaw_forward", "jaw_side"):
-            column.prop(group, name, text=f"Jaw {muscle_names.CONTROLS[name][0]}", slider=True)
+            column.prop(group, name, text=f"Jaw {muscle_names.CONTROLS[name][0]}")
         row = self.layout.row(align=True)
         row.prop(group, "blink_r", text="Blink R", slider=True)
         row.prop(group, "blink_l", text="Blink L", slider=True)
         row = self.layout.row(align=True)
-        row.prop(group, "gaze_x", text="Look Side", slider=True)
-        row.prop(group, "gaze_z", text="Look Up", slider=True)
+        row.prop(group, "gaze_x", text="Look Side")
+        row.prop(group, "gaze_z", text="Look Up")
 
 
 def _draw_region(self, context):

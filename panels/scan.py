@@ -17,7 +17,8 @@ class HEADSHOP_PT_scan(SidebarPanel, bpy.types.Panel):
     def draw(self, context):
         """Import, sample, chosen scan and what is known about it."""
         layout, settings = self.layout, context.scene.headshop
-        progress(layout)
+        if progress(layout, "scan"):
+            return
         if needs(layout, context, "scipy"):
             return
         column = layout.column(align=True)
