@@ -10,13 +10,14 @@ from ..anatomy.landmark_names import SKIN
 from ..errors import InputError
 from ..mesh import Mesh
 from ..progress import Progress, Work, portion
-from .bone import NEAR, depth_under
+from .bone import depth_under
 from .carry import BONES, carry
 from .closest import Surface
 from .gate import check_against_scan, check_arrangement
 from .landmarks import require_usable
 from .skin_fit import SkinFit, fit_skin, group
 
+REACH = 20.0  # mm: bone deeper under the skin than this is not measured
 NORMALS = 2.0  # mm over which the scan's normals are averaged
 POOR = 5.0  # mm: a mean distance in the face above which the fit is refused
 LITTLE = 0.08  # share of the face that must have data
@@ -117,9 +118,9 @@ def anatomy_report(head: Head) -> dict:
     surface = Surface(head.skin.vertices, head.skin.triangles)
     outside, thickness = 0, []
     for name in BONES:
-        depth, _ = depth_under(head.parts[name].vertices, surface, 3 * NEAR)
+        depth, _ = depth_under(head.parts[name].vertices, surface, REACH)
         outside += int((depth < -0.05).sum())
-        thickness.append(depth[depth < 3 * NEAR])
+        thickness.append(depth[depth < REACH])
     thickness = np.concatenate(thickness) if thickness else np.zeros(0)
     return {
         "muscles": len(head.muscles),

@@ -4,23 +4,26 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.spatial import cKDTree
 
-from ..anatomy.head import Head
+from ..anatomy.head import Head, Muscle
+from ..anatomy.muscle_shape import Room, reshaped
 from ..anatomy.tissue_depth import tissue_vectors
-from ..mesh import Mesh
 from ..progress import Progress, Work
 from . import bone, eyeballs
 from .closest import Surface
 from .openings import rims, sealed_lids
-from .refine import thinned
+from .refine import scattered, thinned
 from .skin_fit import SkinFit, group
-from .thin_plate_spline import ThinPlateSpline, similarity
+from .thin_plate_spline import System, ThinPlateSpline, similarity
 
 BONES = ("skull", "mandible")
 TEETH = ("teeth_upper", "teeth_lower")
 AROUND_EYE = 32.0  # mm: bone this near carries the eye
 AROUND_TEETH = 28.0
-COARSE, FINE = 7.0, 2.0  # mm between centres of the last warp: everywhere, and around lids and lips
+COARSE = 14.0  # mm between centres of the last warps, away from lids and lips
+GAPS = (("skull", 18.0), ("mandible", 12.0), ("eye_l", 7.0), ("eye_r", 7.0), ("teeth_upper", 8.0), ("teeth_lower", 8.0))
+BUSY = ("lip_upper", "lip_lower") + tuple(f"{x}_{s}" for x in ("lid_upper", "lid_lower", "nostril") for s in ("l", "r"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,12 +47,8 @@ def carry(reference: Head, fit: SkinFit) -> Work:
     deep, through = under_skin(reference, fit)
     parts = {name: through.transform(deep.transform(reference.parts[name].vertices)) for name in BONES}
     parts = bone_by_depth(reference, parts, fitted, size / scale, scale)
-    needs = {name: bone_needs(reference, name, scale) for name in BONES}
-    surface = Surface(fitted, triangles)
-    for name in BONES:
-        parts[name] = bone.keep_inside(reference.parts[name].moved(parts[name]), surface, needs[name])
 
-    yield Progress(0.4, "Eyes and teeth")
+    yield Progress(0.25, "Eyes and teeth")
     eyes = []
     for k, side in enumerate(("l", "r")):
         old = reference.eyes[k]
@@ -62,25 +61,29 @@ def carry(reference: Head, fit: SkinFit) -> Work:
     for name in (*TEETH, "tongue"):
         parts[name] = mouth(reference.parts[name].vertices)
 
-    yield Progress(0.55, "Inner skin and muscles")
-    warp = inner_warp(reference, parts, fitted)
+    yield Progress(0.35, "Inner skin")
+    between = Between(reference)
     final = fitted.copy()
-    final[inner] = warp.transform(skin.vertices[inner])
+    final[inner] = between.warp(parts, fitted).transform(skin.vertices[inner])
     for k, side in enumerate(("l", "r")):
         if side in fit.closed:
             final = sealed_lids(reference, rims(reference), final, eyes[k], side)
         final = lids_on_eye(reference, final, parts[f"eye_{side}"], eyes[k], k, side, inner)
-    muscles = tuple(carried_muscle(m, warp) for m in reference.muscles)
 
-    yield Progress(0.75, "Bone under the skin")
+    yield Progress(0.5, "Bone under the skin")
     surface = Surface(final, triangles)
     moved = 0.0
     for name in BONES:
-        before = parts[name]
-        parts[name] = bone.keep_inside(reference.parts[name].moved(before), surface, needs[name])
+        before, least = parts[name], bone_needs(reference, name, scale)
+        parts[name] = bone.keep_inside(reference.parts[name].moved(before), surface, least)
         moved = max(moved, float(np.linalg.norm(parts[name] - before, axis=1).max()))
     jaw = carried_jaw(reference, parts, mouth, scale)
     parts["skin"] = final
+
+    yield Progress(0.8, "Muscles")
+    warp = between.warp(parts, final)
+    room = Room(skin.moved(final), [reference.parts[n].moved(parts[n]) for n in BONES], inner)
+    muscles = tuple(carried_muscle(m, warp, room) for m in reference.muscles)
     head = replace(reference.with_vertices(parts), muscles=muscles, jaw=jaw, eyes=tuple(eyes))
     return Carried(head, moved)
 
@@ -88,9 +91,8 @@ def carry(reference: Head, fit: SkinFit) -> Work:
 def under_skin(reference: Head, fit: SkinFit):
     """The warps of space up to the last stage, and one more that follows what the last stage added (step 4)."""
     outer = np.unique(fit.outer)
-    before = fit.chain.transform(reference.skin.vertices[outer])
-    pick = thinned(before, COARSE)
-    source, target = before[pick], fit.fitted.vertices[outer][pick]
+    outer = outer[scattered(reference.skin.vertices[outer], COARSE)]
+    source, target = fit.chain.transform(reference.skin.vertices[outer]), fit.fitted.vertices[outer]
     return fit.chain, ThinPlateSpline.fit(source, target, 1.0)
 
 
@@ -111,8 +113,6 @@ def bone_needs(reference: Head, name: str, scale: float) -> np.ndarray:
     depth, found = bone.depth_under(reference.parts[name].vertices, surface, bone.NEAR)
     inner = group(reference, "inner") > 0.5
     # `Surface` welds, so the cups are told by the skin's own nearest vertex.
-    from scipy.spatial import cKDTree
-
     nearest = cKDTree(reference.skin.vertices).query(np.where(found.found[:, None], found.points, 0.0))[1]
     return bone.least_depth(depth, inner[nearest] & found.found) * min(scale, 1.0)
 
@@ -121,8 +121,6 @@ def near_bone(reference: Head, parts, points, radius):
     """Callable that carries points as the bone within ``radius`` mm of ``points`` (k, 3) moves: a similarity."""
     source = np.concatenate([reference.parts[name].vertices for name in BONES])
     target = np.concatenate([parts[name] for name in BONES])
-    from scipy.spatial import cKDTree
-
     pick = cKDTree(points).query(source)[0] < radius
     if pick.sum() < 12:
         pick[:] = True
@@ -137,6 +135,7 @@ def mouth_similarity(reference: Head, parts, fitted, outer):
     """
     teeth = np.concatenate([reference.parts[name].vertices for name in TEETH])
     with_bone = near_bone(reference, parts, teeth, AROUND_TEETH)
+    teeth = teeth[scattered(teeth, 4.0)]
     before = Surface(reference.skin.vertices, outer).closest(teeth)
     moved = with_bone(teeth)
     after = Surface(fitted, outer).closest(moved)
@@ -152,28 +151,30 @@ def mouth_similarity(reference: Head, parts, fitted, outer):
     return lambda x: with_bone(x) + back_shift
 
 
-def inner_warp(reference: Head, parts, fitted) -> ThinPlateSpline:
-    """The warp for what lies between the surfaces: skin seen from outside, bone, eyeballs and teeth all carry it."""
-    skin = reference.skin.vertices
-    outer = np.flatnonzero(group(reference, "inner") <= 0.5)
-    busy = np.zeros(len(skin), dtype=bool)
-    for name in ("lip_upper", "lip_lower", "lid_upper_l", "lid_upper_r", "lid_lower_l", "lid_lower_r"):
-        busy |= group(reference, name) > 0.3
-    for name in ("nostril_l", "nostril_r"):
-        busy |= group(reference, name) > 0.3
-    near = outer[busy[outer]]
-    near = near[thinned(skin[near], FINE * 0.25)]
-    far = outer[~busy[outer]]
-    far = far[thinned(skin[far], COARSE)]
-    source, target = [skin[near], skin[far]], [fitted[near], fitted[far]]
-    for name, gap in (("skull", 9.0), ("mandible", 7.0), ("eye_l", 4.0), ("eye_r", 4.0), *((n, 4.0) for n in TEETH)):
-        vertices = reference.parts[name].vertices
-        pick = thinned(vertices, gap)
-        source.append(vertices[pick])
-        target.append(parts[name][pick])
-    source, target = np.concatenate(source), np.concatenate(target)
-    keep = thinned(source, 0.2)
-    return ThinPlateSpline.fit(source[keep], target[keep], 0.05)
+class Between:
+    """The warp for what lies between the surfaces: skin seen from outside, bone, eyeballs and teeth all carry it.
+
+    Made once for a reference; ``warp(parts, skin)`` solves it for fitted parts (name -> (n, 3) mm) and skin (n, 3).
+    """
+
+    def __init__(self, reference: Head):
+        skin = reference.skin.vertices
+        outer = np.flatnonzero(group(reference, "inner") <= 0.5)
+        busy = np.zeros(len(skin), dtype=bool)
+        for name in BUSY:
+            busy |= group(reference, name) > 0.3
+        far = outer[~busy[outer]]
+        self._pick = {"skin": np.concatenate([outer[busy[outer]], far[scattered(skin[far], COARSE)]])}
+        for name, gap in GAPS:
+            self._pick[name] = scattered(reference.parts[name].vertices, gap)
+        source = np.concatenate([reference.parts[name].vertices[pick] for name, pick in self._pick.items()])
+        self._keep = thinned(source, 0.2)
+        self._system = System(source[self._keep], 0.05)
+
+    def warp(self, parts, skin) -> ThinPlateSpline:
+        """The spline that takes the reference's parts to these."""
+        target = [(skin if name == "skin" else parts[name])[pick] for name, pick in self._pick.items()]
+        return self._system.solve(np.concatenate(target)[self._keep])
 
 
 def lids_on_eye(reference: Head, skin, ball, eye, k: int, side: str, inner):
@@ -197,21 +198,13 @@ def angle_from(vectors, direction):
     return np.arccos(np.clip(vectors @ direction / np.maximum(length, 1e-9), -1, 1))
 
 
-def carried_muscle(muscle, warp):
-    """A muscle whose fibres, centre and shape went through ``warp``; widths follow the local scale."""
+def carried_muscle(muscle: Muscle, warp, room: Room) -> Muscle:
+    """A muscle whose fibres went through ``warp`` and whose belly is made anew in the room there is (5.2, item 3)."""
     fibres = warp.transform(muscle.fibres)
-    across = _length(fibres) / max(_length(muscle.fibres), 1e-9)
+    grow = float(np.clip(_length(fibres) / max(_length(muscle.fibres), 1e-9), 0.5, 1.6)) ** 0.5
     centre = None if muscle.centre is None else warp.transform(muscle.centre[None])[0]
-    shape: Mesh = muscle.shape.moved(warp.transform(muscle.shape.vertices))
-    grow = float(np.clip(across, 0.5, 1.6)) ** 0.5
-    return replace(
-        muscle,
-        fibres=fibres,
-        centre=centre,
-        shape=shape,
-        width=muscle.width * grow,
-        thickness=muscle.thickness * grow,
-    )
+    muscle = replace(muscle, width=muscle.width * grow, thickness=muscle.thickness * grow)
+    return reshaped(muscle, fibres, room, centre)
 
 
 def _length(fibres) -> float:

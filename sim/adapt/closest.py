@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 from ..mesh import vertex_normals
 from .triangle_projection import closest_on_triangles
 
-SAMPLES = 250_000  # a finer cover does not pay for the time its tree takes
+SAMPLES = 160_000  # a finer cover does not pay for the time its tree takes
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +97,7 @@ class Surface:
         self._topology()
         self.normals = self._smoothed(smooth)
         # Finer than the triangles where there are few: less to try for each query.
-        spacing = max(float(np.median(np.sqrt(double))), 1e-6) * (0.4 if len(double) < 30_000 else 0.7)
+        spacing = max(float(np.median(np.sqrt(double))), 1e-6) * (0.55 if len(double) < 30_000 else 0.75)
         samples, self._owner, self._radius = _cover(self.corners, spacing)
         self._tree = cKDTree(samples)
 

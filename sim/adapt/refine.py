@@ -4,6 +4,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from ..mesh import surface_points
 from .closest import Surface
@@ -132,12 +133,19 @@ def refine(skin, outer, target: Surface, feature_mesh, pairs: Pairs, rounds: int
 
 
 def thinned(points, gap):
-    """Indices of points of which no earlier one is nearer than ``gap`` mm (greedy, in order)."""
-    from scipy.spatial import cKDTree
-
+    """Indices of points of which no earlier one is nearer than ``gap`` mm (greedy, in order); for small gaps."""
     near = cKDTree(points).query_pairs(gap, output_type="ndarray")
     keep = np.ones(len(points), dtype=bool)
     for i, j in near[np.lexsort((near[:, 1], near[:, 0]))]:
         if keep[i]:
             keep[j] = False
     return np.flatnonzero(keep)
+
+
+def scattered(points, gap):
+    """Indices of one point for each cube of ``gap`` mm that holds any: the one nearest to the cube's middle."""
+    cell = np.floor(points / gap)
+    off = np.linalg.norm(points / gap - cell - 0.5, axis=1)
+    order = np.lexsort((off, *cell.T))
+    _, first = np.unique(cell[order], axis=0, return_index=True)
+    return np.sort(order[first])
