@@ -3,7 +3,8 @@
 
 A control ties a grid vertex (column u, row v) to two coordinates on the head; the third is found by a ray. Kinds, each
 with its two coordinates in mm (frame of the reference head): ``F`` from the front (x, z), ``S`` from the subject's left
-(y, z), ``B`` from behind (x, z), ``D`` from below (x, y), ``T`` from above (x, y); ``N`` is the nearest point to (x, y, z).
+(y, z), ``B`` from behind (x, z), ``D`` from below (x, y), ``T`` from above (x, y);
+``N`` is the nearest point to (x, y, z).
 """
 
 #: (u, v): (kind, coordinates...) for u >= 0.

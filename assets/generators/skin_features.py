@@ -22,8 +22,8 @@ def feature_mesh(positions: dict[str, np.ndarray]) -> np.ndarray:
     side = np.array([{"_l": 1, "_r": -1}.get(name[-2:], 0) for name in SKIN])
     hull = ConvexHull(unit)
     triangles = hull.simplices.astype(np.int32)
-    outward = np.einsum("ij,ij->i", np.cross(unit[triangles[:, 1]] - unit[triangles[:, 0]],
-                                             unit[triangles[:, 2]] - unit[triangles[:, 0]]), unit[triangles].mean(1))  # fmt: skip
+    a, b, c = (unit[triangles[:, k]] for k in range(3))
+    outward = np.einsum("ij,ij->i", np.cross(b - a, c - a), a + b + c)
     triangles[outward < 0] = triangles[outward < 0][:, ::-1]
     one_side = triangles[(side[triangles] >= 0).all(axis=1) & (side[triangles] > 0).any(axis=1)]
     neck = {SKIN.index("gn"), SKIN.index("op")}

@@ -113,8 +113,8 @@ def skin_groups(layout: Layout, vertices: np.ndarray) -> dict[str, np.ndarray]:
     )  # fmt: skip
     for side, indices in (("upper", range(20, 35)), ("lower", range(4, 19))):
         out["lip_" + side] = p.patch(
-            (p.ring("mouth", 2, 2, indices), 0.35), (p.ring("mouth", 3, 7, indices), 1), (p.ring("mouth", 3, 7, (3, 19)), 0.5),
-            rounds=0,
+            (p.ring("mouth", 2, 2, indices), 0.35), (p.ring("mouth", 3, 7, indices), 1),
+            (p.ring("mouth", 3, 7, (3, 19)), 0.5), rounds=0,
         )  # fmt: skip
     for s, sides in (("_l", (1,)), ("_r", (-1,))):
         for side, indices in (("upper", range(15, 26)), ("lower", range(3, 14))):

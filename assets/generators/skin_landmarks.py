@@ -9,6 +9,7 @@ from .skin_layout import Layout
 
 #: Landmarks that are vertices of the layout: grid (u, v) or (hole, ring, index), left side.
 PLACES = {
+    "g": (0, 5),
     "n": (0, 6),
     "sn": (0, 15),
     "ls": ("mouth", 3, 27),
@@ -103,8 +104,7 @@ def skin_landmarks(
     crown = layout.crown[:, layout.crown.shape[1] // 2]
     found["v"] = f.extreme(np.r_[crown, f.front[:2]], lambda p: p[:, 2])
     found["op"] = f.extreme(f.back, lambda p: np.where(p[:, 2] > -20, p[:, 1], -np.inf))
-    found["g"] = f.extreme(f.front[3:6], lambda p: -p[:, 1] - 0.01 * p[:, 2])
-    found["tr"] = f.between((0, 1), (0, 0), 0.4)
+    found["tr"] = f.between((0, 1), (0, 0), 0.75)
     found["se"] = f.between((0, 6), (0, 7), 0.5)
     found["prn"] = f.extreme(f.front[10:15], lambda p: -p[:, 1])
     found["sl"] = f.extreme(
