@@ -182,7 +182,7 @@ def _open(options):
     path = Path(options.head).resolve()
     with quiet():
         try:
-            bpy.ops.wm.open_mainfile(filepath=str(path), load_ui=False, use_scripts=False)
+            bpy.ops.wm.open_mainfile(filepath=str(path), use_scripts=False)
         except RuntimeError as error:
             raise InputError(
                 f"{options.head} is not a .blend file that can be opened: build the head again."
@@ -208,14 +208,16 @@ def _run(work, options):
 
 
 def _set_stage(skin) -> None:
-    """Lights and a camera, so that the file opens as a picture."""
+    """Lights, a camera and a viewport on the head, so that the file opens as a picture."""
     import bpy
 
+    from .opening_view import look_at
     from .quiet import quiet
     from .stage import set_stage
 
     with quiet():
         set_stage(bpy.context.scene, skin)
+    look_at(skin)
 
 
 def _plain_folder(outputs: Outputs, options):

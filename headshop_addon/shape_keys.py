@@ -20,7 +20,7 @@ from ..sim.tissue.solver import rest_state, solve
 from . import bridge, heads
 
 SHAPES = "headshop_shapes"
-ITERATIONS = 300  # until it rests, not until it looks right
+ITERATIONS = 200  # until it rests, not until it looks right
 STILL = 0.001  # mm: a part that moves less gets no key
 
 

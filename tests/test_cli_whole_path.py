@@ -72,7 +72,7 @@ def test_build(built, reference):
 
 
 def test_bake_after_saving_and_export(built, monkeypatch):
-    two = {name: pose for name, pose in expressions.expressions().items() if name in ("smile", "jaw_open")}
+    two = {name: pose for name, pose in expressions.expressions().items() if name in ("smile", "frown")}
     monkeypatch.setattr(expressions, "expressions", lambda: two)
     before = (built / "head.blend").read_bytes()
     run("bake", built / "head.blend", "--set", "expressions", "-o", built / "baked.blend", "--export", built / "plain")
@@ -80,7 +80,7 @@ def test_bake_after_saving_and_export(built, monkeypatch):
     report = json.loads((built / "plain" / "report.json").read_text())
     assert report["shapes"].keys() == two.keys()
     assert all(shape.keys() == SHAPE for shape in report["shapes"].values())
-    assert report["shapes"]["jaw_open"]["peak_mm"] > 20
+    assert report["shapes"]["smile"]["peak_mm"] > 5
     with np.load(built / "plain" / "shapes.npz") as shapes:
         assert shapes["names"].tolist() == list(two)
         peaks = np.linalg.norm(shapes["deltas"], axis=2).max(axis=1)
@@ -116,3 +116,10 @@ def test_it_is_a_program(built):
     ]
     done = subprocess.run(command, capture_output=True, text=True)
     assert (done.returncode, done.stdout) == (0, ""), done.stderr
+
+
+def test_the_file_opens_on_the_head(bpy, built):
+    bpy.ops.wm.open_mainfile(filepath=str(built / "baked.blend"))
+    areas = [area for screen in bpy.data.screens for area in screen.areas if area.type == "VIEW_3D"]
+    assert areas and all(area.spaces.active.region_3d.view_distance < 1.5 for area in areas)
+    assert bpy.context.scene.camera is not None
