@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """One picture that shows what a head is: its scan, skin, muscles and bones, and every expression."""
 
+import math
 from dataclasses import dataclass
 
 import bpy
@@ -15,7 +16,7 @@ from .stage import aim_camera
 from .studio import Model, studio
 from .text_labels import blend, put_text, rounded
 
-PAGE = (0.055, 0.058, 0.064)
+PAGE, CARD = (0.055, 0.058, 0.064), (0.085, 0.089, 0.098)
 INK, DIM = (0.95, 0.95, 0.94, 1.0), (0.95, 0.95, 0.94, 0.55)
 YAW, SIDE_YAW = 12.0, 30.0
 FIRST = ("joy", "sadness", "anger", "fear", "disgust", "surprise", "smile", "jaw_open")
@@ -30,6 +31,7 @@ class Tile:
     show: tuple[str, ...]
     key: str = ""
     yaw: float = YAW
+    close: bool = False
 
 
 def render_sheet(
@@ -52,8 +54,8 @@ def render_sheet(
     InputError : not a head, or a key is not there.
     """
     anatomy, shapes = anatomy_tiles(skin), shape_tiles(skin, default_keys(skin) if keys is None else keys)
-    columns = max(4, min(8, int(np.ceil(np.sqrt(0.9 * len(shapes))))))
-    width, height = tile or ((480, 560) if columns == 4 else (1920 // columns // 2 * 2, 2240 // columns // 2 * 2))
+    columns = max(4, min(8, math.ceil(math.sqrt(0.9 * len(shapes)))))
+    width, height = tile or (1800 // columns, 2160 // columns)
     tiles, pictures = anatomy + shapes, []
     with Outputs() as outputs:
         target = outputs.file(path)
@@ -63,7 +65,7 @@ def render_sheet(
                 yield Progress(number / (len(tiles) + 1), f"Rendering {each.title}")
                 model.show(*each.show)
                 model.pose(each.key)
-                aim_camera(scene, frame, each.yaw, aspect=width / height)
+                aim_camera(scene, frame, each.yaw, aspect=width / height, close=each.close)
                 pictures.append(render_picture(scene)[..., :3])
         yield Progress(len(tiles) / (len(tiles) + 1), "Composing the sheet")
         rows = [("From scan to anatomy", list(zip(anatomy, pictures, strict=False)))]
@@ -83,14 +85,14 @@ def anatomy_tiles(skin: bpy.types.Object) -> list[Tile]:
     if scan is not None:
         tiles.append(Tile("Scan", f"{len(scan.data.polygons):,} triangles, as it came", ("scan",)))
     near = f"{fit['mean_mm']:.2f} mm from the scan on average" if "mean_mm" in fit else "ready to act"
-    tiles.append(Tile("Head", near, ("skin", "eyes", "bones")))
+    tiles.append(Tile("Head", near, ("skin", "features")))
     if muscles:
         tiles.append(
-            Tile("Under the skin", "one anatomy for every head", ("half", "eyes", "bones", "muscles"), yaw=22.0)
+            Tile("Under the skin", "one anatomy for every head", ("half", "features", "bones", "muscles"), yaw=22.0)
         )
-        tiles.append(Tile("Muscles", f"{len(muscles)} that pull", ("eyes", "bones", "muscles"), yaw=SIDE_YAW))
+        tiles.append(Tile("Muscles", f"{len(muscles)} that pull", ("features", "bones", "muscles"), yaw=SIDE_YAW))
     if scan is None or not muscles:
-        tiles.append(Tile("Skull", "hinged jaw", ("eyes", "bones"), yaw=SIDE_YAW))
+        tiles.append(Tile("Skull", "hinged jaw", ("features", "bones"), yaw=SIDE_YAW))
     return tiles
 
 
@@ -119,7 +121,8 @@ def shape_tiles(skin: bpy.types.Object, keys: list[str]) -> list[Tile]:
             raise InputError(f"{skin.name!r} has no shape key {key!r}: bake it first.")
         peak = report.get(key, {}).get("peak_mm")
         title = key.replace("_", " ").capitalize() if key.islower() else key
-        tiles.append(Tile(title, "" if peak is None else f"moves up to {peak:.0f} mm", ("skin", "eyes", "bones"), key))
+        note = "" if peak is None else f"moves up to {peak:.0f} mm"
+        tiles.append(Tile(title, note, ("skin", "features"), key, close=True))
     return tiles
 
 
@@ -136,37 +139,40 @@ def compose(name: str, summary: str, rows, columns: int) -> np.ndarray:
     rows : sections (title, [(`Tile`, picture (h, w, 3)), …])
     """
     height, width = rows[0][1][0][1].shape[:2]
-    unit = width * columns / 1920  # all type and gaps follow the page
-    gap, margin, head, section = (max(int(round(v * unit)), 1) for v in (14, 56, 150, 64))
-    lines = [int(np.ceil(len(tiles) / columns)) for _, tiles in rows]
+    unit = width * columns / 1800  # all type and gaps follow the page
+    kind = unit * min(4 / columns * 1.35, 1.0)  # captions follow the tiles
+    gap, margin, head, section = (max(round(v * unit), 1) for v in (14, 52, 148, 62))
+    strip = round(66 * kind)
+    lines = [math.ceil(len(tiles) / columns) for _, tiles in rows]
     page_width = 2 * margin + columns * width + (columns - 1) * gap
-    page_height = head + sum(section + n * (height + gap) for n in lines) + margin - gap
+    page_height = head + sum(section + n * (height + strip + gap) for n in lines) + margin - gap
     page = np.empty((page_height, page_width, 4), dtype=np.float32)
     page[..., :3], page[..., 3] = PAGE, 1.0
-    put_text(page, name, margin, 0.62 * head, 54 * unit, INK)
-    put_text(page, "Head Shop", page_width - margin, 0.62 * head, 26 * unit, DIM, "right")
-    put_text(page, summary, margin, 0.62 * head + 38 * unit, 22 * unit, DIM)
-    shape = rounded(height, width, 12 * unit)
+    put_text(page, name, margin - 2 * unit, 92 * unit, 52 * unit, INK)
+    put_text(page, summary, margin, 128 * unit, 21 * unit, DIM)
+    put_text(page, "Head Shop", page_width - margin, 92 * unit, 25 * unit, DIM, "right")
+    shape = rounded(height + strip, width, 12 * unit)
     y = head
     for (title, tiles), n in zip(rows, lines, strict=True):
-        put_text(page, title, margin, y + 0.62 * section, 24 * unit, INK)
+        put_text(page, title, margin, y + 0.62 * section, 23 * unit, INK)
         y += section
         for number, (tile, picture) in enumerate(tiles):
             row, column = divmod(number, columns)
-            left, top = margin + column * (width + gap), y + row * (height + gap)
-            blend(page, shape, _grounded(picture), left, top)
-            scale = unit if columns == 4 else 1.25 * unit
-            put_text(
-                page, tile.title, left + 22 * scale, top + height - (46 if tile.note else 26) * scale, 27 * scale, INK
-            )
-            put_text(page, tile.note, left + 22 * scale, top + height - 20 * scale, 18 * scale, DIM)
-        y += n * (height + gap)
+            left, top = margin + column * (width + gap), y + row * (height + strip + gap)
+            blend(page, shape, _card(picture, strip), left, top)
+            foot = top + height + strip
+            put_text(page, tile.title, left + 20 * kind, foot - (44 if tile.note else 30) * kind, 26 * kind, INK)
+            put_text(page, tile.note, left + 20 * kind, foot - 18 * kind, 18 * kind, DIM)
+        y += n * (height + strip + gap)
     return page
 
 
-def _grounded(picture: np.ndarray) -> np.ndarray:
-    """The picture darkened towards its foot, where the neck ends and the caption stands."""
-    height = len(picture)
-    fall = np.clip((np.arange(height) / height - 0.72) / 0.26, 0, 1)
+def _card(picture: np.ndarray, strip: int) -> np.ndarray:
+    """The picture above an empty strip for the caption, darkened into it where the neck ends."""
+    height, width = picture.shape[:2]
+    card = np.empty((height + strip, width, 3), dtype=np.float32)
+    card[:] = CARD
+    fall = np.clip((np.arange(height) / height - 0.80) / 0.20, 0, 1)
     fall = (fall * fall * (3 - 2 * fall)).astype(np.float32)[:, None, None]
-    return picture + fall * (np.array(PAGE, dtype=np.float32) * 1.35 - picture)
+    card[:height] = picture + fall * (card[:height] - picture)
+    return card

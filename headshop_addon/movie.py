@@ -2,6 +2,7 @@
 """A head's animation as an H.264 film, rendered picture by picture so that it can be followed and stopped."""
 
 import tempfile
+from contextlib import contextmanager
 from pathlib import Path
 
 import bpy
@@ -38,15 +39,16 @@ def render_movie(
     if any(length % 2 or length < 2 for length in size):
         raise InputError(f"A film of {size[0]} by {size[1]} pixels cannot be written as H.264: use even numbers.")
     first, last = frames or animated_frames(skin)
-    original = bpy.context.scene
-    fps, base = original.render.fps, original.render.fps_base
+    fps, base = bpy.context.scene.render.fps, bpy.context.scene.render.fps_base
     with Outputs() as outputs, tempfile.TemporaryDirectory(prefix="headshop-") as folder:
         target = outputs.file(path)
         pictures = [Path(folder) / f"{number:05d}.png" for number in range(last - first + 1)]
-        with studio(skin, width=size[0], height=size[1], samples=samples, engine=engine, yaw=yaw) as (scene, _):
+        stage = {"width": size[0], "height": size[1], "samples": samples, "engine": engine, "yaw": yaw, "close": True}
+        with _values_kept(skin), studio(skin, **stage) as (scene, _):
             scene.render.fps, scene.render.fps_base = fps, base
-            for obj in heads.parts_of(skin).values():
-                scene.collection.objects.link(obj)
+            for part, obj in heads.parts_of(skin).items():
+                if part not in ("skull", "mandible"):
+                    scene.collection.objects.link(obj)
             for number, picture in enumerate(pictures):
                 yield Progress(0.97 * number / len(pictures), f"Rendering frame {first + number} of {last}")
                 scene.frame_set(first + number)
@@ -54,6 +56,18 @@ def render_movie(
         yield Progress(0.97, "Writing the film")
         encode(pictures, target, size, fps, base)
     return path
+
+
+@contextmanager
+def _values_kept(skin: bpy.types.Object):
+    """Playing another scene's frames writes the values of those frames into the shape keys: put them back."""
+    keys = [obj.data.shape_keys for obj in heads.parts_of(skin).values() if obj.data.shape_keys]
+    kept = [(block, block.value) for key in keys for block in key.key_blocks]
+    try:
+        yield
+    finally:
+        for block, value in kept:
+            block.value = value
 
 
 def animated_frames(skin: bpy.types.Object) -> tuple[int, int]:

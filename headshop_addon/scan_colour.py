@@ -16,6 +16,7 @@ from .skin_paint import adjacency, smoothed, spread
 NEIGHBOURS = 4
 #: mm beyond the scan's own spacing within which its colour counts fully, and beyond which it does not count
 NEAR, FAR = 1.5, 4.0
+SIZE = 768  # pixels: texels of about 0.7 mm, finer than most scans
 EVENING = 0.55  # how much of the broad shading is taken out
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
@@ -104,7 +105,7 @@ def texels(skin: Mesh, size: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return index, corners[np.concatenate(owner)[first]], np.concatenate(inside)[first]
 
 
-def colour_image(skin: Mesh, source: ScanColour, inner: np.ndarray, name: str, size: int = 768):
+def colour_image(skin: Mesh, source: ScanColour, inner: np.ndarray, name: str, size: int | None = None):
     """Paint the scan's colours on the skin's UV map: (packed image, linear colour (n, 3) per vertex) or None.
 
     None if the scan has no part near the skin, or the skin has no UV map.
@@ -113,6 +114,7 @@ def colour_image(skin: Mesh, source: ScanColour, inner: np.ndarray, name: str, s
     if found is None or skin.uv is None:
         return None
     colour, gain = found
+    size = size or SIZE
     index, corners, weights = texels(skin, size)
     normals = vertex_normals(skin.vertices, skin.triangles)
 

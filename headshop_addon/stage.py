@@ -23,10 +23,10 @@ LENS_MM = 100.0
 #: role -> (degrees to the image's right, degrees up, distance, (width, height), watts, colour). Lengths are in head
 #: heights; watts are for a head of `USUAL_HEIGHT` and grow with its square.
 LIGHTS = {
-    "Key": (-44, 24, 4.6, (1.8, 1.8), 17.0, (1.0, 0.955, 0.90)),
-    "Fill": (52, 6, 5.2, (4.4, 4.4), 3.2, (0.86, 0.93, 1.0)),
-    "Rim": (146, 14, 4.0, (1.1, 3.4), 17.0, (0.90, 0.95, 1.0)),
-    "Kicker": (-150, 10, 4.4, (0.9, 3.4), 9.0, (1.0, 0.96, 0.9)),
+    "Key": (-40, 26, 4.6, (1.7, 1.7), 18.5, (1.0, 0.955, 0.90)),
+    "Fill": (46, 4, 5.2, (4.4, 4.4), 4.2, (0.86, 0.93, 1.0)),
+    "Rim": (160, 12, 4.0, (1.0, 3.2), 11.0, (0.90, 0.95, 1.0)),
+    "Kicker": (-158, 8, 4.4, (0.9, 3.2), 8.0, (1.0, 0.96, 0.9)),
 }
 USUAL_HEIGHT = 0.225
 
@@ -121,17 +121,21 @@ def _own_object(collection, role: str, make_data) -> bpy.types.Object:
     return made
 
 
-def aim_camera(scene, frame: Portrait, yaw: float = 12.0, pitch: float = 3.0, aspect: float = 0.857) -> None:
+def aim_camera(
+    scene, frame: Portrait, yaw: float = 12.0, pitch: float = 3.0, aspect: float = 0.83, close: bool = False
+) -> None:
     """Put the scene's stage camera ``yaw`` degrees to the image's right of the face and ``pitch`` above it.
 
     aspect : width through height of the picture; the head always fills the same part of the height.
+    close : come nearer for the face, with room for a dropped jaw, at the cost of the crown
     """
     camera = _own_object(_own_collection(scene), "Camera", bpy.data.cameras.new)
     camera.data.lens, camera.data.sensor_fit, camera.data.sensor_height = LENS_MM, "VERTICAL", 36.0
-    # Room above the hair line and down to the throat; a narrow picture must still hold the ears.
-    seen = frame.height * max(1.34, 1.02 / aspect)
+    # In head heights: from above the crown to the throat; a narrow picture must still hold both ears.
+    top, bottom = (0.47, -0.75) if close else (0.60, -0.74)
+    seen = frame.height * max(top - bottom, 0.95 / aspect)
     distance = seen * LENS_MM / 36.0 + 0.25 * frame.height
-    target = frame.centre - frame.up * 0.06 * frame.height + frame.back * 0.15 * frame.height
+    target = frame.centre + frame.up * (top + bottom) / 2 * frame.height + frame.back * 0.15 * frame.height
     moved = Portrait(target, frame.left, frame.back, frame.up, frame.height)
     camera.matrix_world = _looking(moved.point(yaw, pitch, distance), target, frame.up)
     camera.data.clip_start, camera.data.clip_end = 0.05 * distance, 20 * distance
@@ -171,7 +175,7 @@ def backdrop() -> bpy.types.World:
     return world
 
 
-def set_render(scene, width: int = 960, height: int = 1120, samples: int = 24, engine: str = "CYCLES") -> None:
+def set_render(scene, width: int = 960, height: int = 1152, samples: int = 24, engine: str = "CYCLES") -> None:
     """Render settings: few samples and a denoiser, few bounces, no GPU needed; ``engine`` CYCLES or EEVEE.
 
     Eevee wants a GPU; Cycles is what works everywhere, headless too.
@@ -215,7 +219,7 @@ def set_render(scene, width: int = 960, height: int = 1120, samples: int = 24, e
     view.exposure, view.gamma, view.use_curve_mapping = 0.0, 1.0, False
 
 
-def set_stage(scene, skin_object, yaw: float = 12.0, pitch: float = 3.0, **render) -> Portrait:
+def set_stage(scene, skin_object, yaw: float = 12.0, pitch: float = 3.0, close: bool = False, **render) -> Portrait:
     """Light the head, put the camera before it and set the scene's render settings (see `set_render`).
 
     Stage objects of an earlier call are reused. Returns how the head stands.
@@ -224,6 +228,6 @@ def set_stage(scene, skin_object, yaw: float = 12.0, pitch: float = 3.0, **rende
     set_render(scene, **render)
     aspect = scene.render.resolution_x / scene.render.resolution_y
     light_head(scene, frame)
-    aim_camera(scene, frame, yaw, pitch, aspect)
+    aim_camera(scene, frame, yaw, pitch, aspect, close)
     scene.world = backdrop()
     return frame

@@ -35,6 +35,15 @@ def studio(skin: bpy.types.Object, **stage):
 _KINDS = ("collections", "objects", "meshes", "lights", "cameras")
 
 
+#: part -> set it is shown with; ``features`` are what is seen of a face beside its skin
+_SETS = {
+    "skin": "skin",
+    "skull": "bones",
+    "mandible": "bones",
+    **dict.fromkeys(("eye_l", "eye_r", "teeth_upper", "teeth_lower", "tongue"), "features"),
+}
+
+
 class Model:
     """Copies of a head's parts, muscles and scan, to be posed and cut without touching the head."""
 
@@ -43,7 +52,7 @@ class Model:
         self.sets: dict[str, bpy.types.Collection] = {}
         self._shapes: dict[bpy.types.Object, dict[str, np.ndarray]] = {}
         for part, obj in heads.parts_of(skin).items():
-            self._add(scene, {"skin": "skin", "eye_l": "eyes", "eye_r": "eyes"}.get(part, "bones"), obj)
+            self._add(scene, _SETS[part], obj)
         for obj in heads.muscles_of(skin).values():
             self._add(scene, "muscles", obj)
         self.scan = heads.scan_of(skin)
@@ -75,13 +84,13 @@ class Model:
         return copy
 
     def show(self, *names: str) -> None:
-        """Show these of ``skin half eyes bones muscles scan`` and hide the rest."""
+        """Show these of ``skin half features bones muscles scan`` and hide the rest."""
         for name, collection in self.sets.items():
             collection.hide_render = name not in names
 
     def pose(self, key: str = "") -> None:
         """Put all parts into a shape key of the skin at full value; without one, to rest."""
-        for name in ("skin", "eyes", "bones"):
+        for name in ("skin", "features", "bones"):
             for obj in self.sets[name].objects:
                 shapes = self._shapes[obj]
                 write_positions(obj, shapes.get(key, shapes[""]))

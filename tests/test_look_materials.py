@@ -1,0 +1,170 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Materials, the attributes they read, the scan's colours, and the portrait frame."""
+
+import numpy as np
+import pytest
+from headshop.sim.anatomy.head import MATERIALS
+
+
+@pytest.fixture
+def skin(bpy, reference):
+    """The skin of a head that has no materials yet."""
+    from headshop.headshop_addon import heads
+
+    heads.create_head(reference, "Ada")
+    (skin,) = heads.find_heads()
+    return skin
+
+
+def test_every_slot_is_filled_and_dressing_twice_adds_nothing(bpy, skin, reference):
+    from headshop.headshop_addon import heads, materials
+
+    materials.dress_head(skin)
+    objects = [*heads.parts_of(skin).values(), *heads.muscles_of(skin).values()]
+    assert all(slot is not None for obj in objects for slot in obj.data.materials)
+    for part, obj in heads.parts_of(skin).items():
+        names = [slot.name.removeprefix("Head Shop ").lower() for slot in obj.data.materials]
+        assert names == list(MATERIALS[part])
+    once = {kind: len(getattr(bpy.data, kind)) for kind in ("materials", "images", "node_groups")}
+    attributes = {obj.name: sorted(a.name for a in obj.data.attributes) for obj in objects}
+    materials.dress_head(skin)
+    heads.create_head(reference, "Grace")
+    materials.dress_head(next(each for each in heads.find_heads() if each != skin))
+    assert {kind: len(getattr(bpy.data, kind)) for kind in once} == once
+    assert {obj.name: sorted(a.name for a in obj.data.attributes) for obj in objects} == attributes
+
+
+def test_an_artists_material_stays(bpy, skin):
+    from headshop.headshop_addon import materials
+
+    own = bpy.data.materials.new("Marble")
+    skin.data.materials[0] = own
+    materials.dress_head(skin)
+    assert skin.data.materials[0] == own
+
+
+def test_eye_coordinates_end_at_the_iris(reference):
+    pytest.importorskip("bpy")
+    from headshop.headshop_addon.materials import eye_coordinates
+
+    mesh, eye = reference.parts["eye_l"], reference.eyes[0]
+    place = eye_coordinates(mesh, eye, np.array([0.0, 0.0, 1.0]))
+    radius = np.linalg.norm(place[:, :2], axis=1)
+    iris = np.unique(mesh.faces[mesh.material == MATERIALS["eye_l"].index("iris")])
+    assert radius[iris[iris >= 0]].max() == pytest.approx(1.0)
+    assert 0.15 < place[0, 2] < 0.6
+    back = (mesh.vertices - eye.centre) @ eye.gaze < -0.8 * eye.radius
+    assert radius[back].min() > 1.5
+
+
+def test_fibre_coordinates_run_from_origin_to_insertion(reference):
+    pytest.importorskip("bpy")
+    from headshop.headshop_addon.materials import fibre_coordinates
+
+    muscle = next(m for m in reference.muscles if m.kind == "linear" and not m.ring)
+    along = fibre_coordinates(muscle)[:, 0]
+    assert along.min() < 0.1 and along.max() > 0.9
+    to_origin = np.linalg.norm(muscle.shape.vertices - muscle.path[0], axis=1)
+    assert np.corrcoef(along, to_origin)[0, 1] > 0.9
+
+
+def test_brow_coordinates_mirror(reference):
+    pytest.importorskip("bpy")
+    from headshop.headshop_addon.skin_paint import brow_coordinates
+
+    at = reference.landmark_positions()
+    points = np.array([at["sci_l"], at["sci_r"], at["g"] + [0.5, 0, 0], at["pg"] + [0.5, 0, 0]])
+    found = brow_coordinates(points, at)
+    assert 0 < found[0, 0] < 1 and abs(found[0, 1] - 4) < 3
+    np.testing.assert_allclose(found[0], found[1], atol=0.2)
+    assert found[2, 0] < 0.05 and found[3, 1] < -20
+
+
+def _coloured_scan(reference):
+    """The skin in front of the tragia as a scan: red on the subject's left, blue on the right."""
+    from headshop.headshop_addon.scan_colour import to_srgb
+    from headshop.sim.mesh import Mesh
+
+    skin = reference.skin
+    seen = skin.vertices[:, 1] < reference.landmark_positions()["t_l"][1]
+    triangles = skin.triangles[seen[skin.triangles].all(axis=1)]
+    linear = np.where(skin.vertices[:, :1] > 0, (0.4, 0.1, 0.1), (0.1, 0.1, 0.4))
+    return Mesh.from_triangles(skin.vertices, triangles, colour=to_srgb(linear).astype(np.float32))
+
+
+def test_the_scans_colours_arrive_and_spread_where_it_has_none(reference):
+    pytest.importorskip("bpy")
+    from headshop.headshop_addon.scan_colour import ScanColour, vertex_colour
+
+    skin, inner = reference.skin, reference.groups["inner"]
+    colour, gain = vertex_colour(skin, ScanColour(_coloured_scan(reference)), inner)
+    assert colour.shape == skin.vertices.shape and np.isfinite(colour).all() and np.isfinite(gain).all()
+    at = reference.landmark_positions()
+    nearest = {n: np.argmin(((skin.vertices - at[n]) ** 2).sum(axis=1)) for n in ("zy_l", "zy_r", "op")}
+    assert colour[nearest["zy_l"], 0] > 0.3 > 0.2 > colour[nearest["zy_l"], 2]
+    assert colour[nearest["zy_r"], 2] > 0.3 > 0.2 > colour[nearest["zy_r"], 0]
+    assert 0.05 < colour[nearest["op"]].min() and colour[nearest["op"]].max() < 0.45
+
+
+def test_a_scan_elsewhere_gives_no_colour(reference):
+    pytest.importorskip("bpy")
+    from headshop.headshop_addon.scan_colour import ScanColour, vertex_colour
+
+    scan = _coloured_scan(reference)
+    far = scan.moved(scan.vertices + [500.0, 0, 0])
+    assert vertex_colour(reference.skin, ScanColour(far), reference.groups["inner"]) is None
+
+
+def test_a_coloured_scan_gives_the_head_a_skin_of_its_own(bpy, reference, monkeypatch):
+    from headshop.headshop_addon import bridge, heads, materials, scan_colour
+
+    monkeypatch.setattr(scan_colour, "SIZE", 96)
+    scan = bridge.mesh_to_object(_coloured_scan(reference), "Scan")
+    bpy.context.scene.collection.objects.link(scan)
+    heads.create_head(reference, "Ada", scan)
+    (skin,) = heads.find_heads()
+    materials.dress_head(skin)
+    material = skin.data.materials[0]
+    (image,) = [node.image for node in material.node_tree.nodes if node.type == "TEX_IMAGE"]
+    assert image.packed_file is not None, "the colours must travel with the file"
+    pixels = np.empty(len(image.pixels), dtype=np.float32)
+    image.pixels.foreach_get(pixels)
+    pixels = pixels.reshape(-1, 4)
+    assert (pixels[:, 0] > pixels[:, 2] + 0.2).mean() > 0.15 and (pixels[:, 2] > pixels[:, 0] + 0.2).mean() > 0.15
+    images = len(bpy.data.images)
+    materials.dress_head(skin)
+    assert len(bpy.data.images) == images and skin.data.materials[0] == material
+
+
+def test_the_portrait_turns_with_the_head(bpy, skin, reference):
+    from headshop.headshop_addon.stage import portrait, set_stage
+    from mathutils import Matrix
+
+    upright = portrait(skin)
+    np.testing.assert_allclose(upright.left, (1, 0, 0), atol=0.02)
+    np.testing.assert_allclose(np.cross(upright.left, upright.back), upright.up, atol=1e-6)
+    assert 0.15 < upright.height < 0.3
+    turn = Matrix.Rotation(1.0, 4, "X") @ Matrix.Rotation(2.0, 4, "Z")
+    skin.matrix_world = Matrix.Translation((0.3, 0.2, 0.1)) @ turn
+    lying = set_stage(bpy.context.scene, skin, width=40, height=48)
+    np.testing.assert_allclose(lying.left, np.array(turn.to_3x3()) @ upright.left, atol=1e-5)
+    bpy.context.view_layer.update()
+    # the camera sees the face's middle near the middle of the picture, upright
+    from bpy_extras.object_utils import world_to_camera_view
+    from mathutils import Vector
+
+    camera = bpy.context.scene.camera
+    up, down = (
+        world_to_camera_view(bpy.context.scene, camera, Vector(lying.centre + s * 0.1 * lying.up)) for s in (1, -1)
+    )
+    assert abs(up.x - 0.5) < 0.1 and up.y > 0.6 and down.y < 0.55
+
+
+def test_staging_twice_leaves_one_stage(bpy, skin):
+    from headshop.headshop_addon.stage import set_stage
+
+    set_stage(bpy.context.scene, skin)
+    objects = len(bpy.data.objects)
+    set_stage(bpy.context.scene, skin, yaw=-20.0)
+    assert len(bpy.data.objects) == objects
+    assert bpy.context.scene.camera.name in bpy.context.scene.objects
