@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""All that lies under a reference skin: bone, eyes, teeth, tongue, muscles, made in the order they depend on each other."""
+"""All that lies under a reference skin: bone, eyes, teeth, tongue, muscles, made each in its turn."""
 
 from dataclasses import dataclass
 
@@ -12,7 +12,7 @@ from ...sim.progress import Progress, Work
 
 @dataclass(frozen=True, eq=False)
 class Anatomy:
-    """What `make_anatomy` returns: every part but the skin, and what ties them together (see `sim.anatomy.head.Head`)."""
+    """What `make_anatomy` returns: every part but the skin, and what ties them together (see `Head`)."""
 
     parts: dict[str, Mesh]
     skull_landmarks: SurfacePoints

@@ -5,7 +5,7 @@ import numpy as np
 
 from ...sim.anatomy.head import Jaw
 from ...sim.mesh import Mesh
-from .skull_depth import BoneSpace
+from .skull_depth import CLEARANCE, BoneSpace
 from .skull_field import carve, curve, ellipsoid, join, meet, plate, tube, turned
 from .skull_nets import surface_nets
 
@@ -18,8 +18,8 @@ def mandible_field(space: BoneSpace):
     at = space.targets
     condyle = condyle_centre(space)
     go, gn, pg, sl, infradentale = at["go_l"], at["gn"], at["pg"], at["sl"], at["id"]
-    ridge_top = infradentale[2]
     arch = np.column_stack([ARCH[:, 0], infradentale[1] + 4.0 + ARCH[:, 1]])
+    ground = np.minimum(space.mouth_limit(arch, -1) - CLEARANCE - 3.6, infradentale[2] - 3.0)
     back = arch[-1]
 
     # Ramus: a sheet between its rear and front borders, its upper edge dipping to the mandibular notch.
@@ -55,12 +55,9 @@ def mandible_field(space: BoneSpace):
     )
     high = curve(
         [
-            [back[0] + 7.0, back[1] + 3.0, ridge_top + 7.0],
-            [back[0] + 2.0, back[1] - 3.0, ridge_top + 5.0],
-            [*arch[5] + [1.0, 0], ridge_top + 3.5],
-            [*arch[3], ridge_top + 0.5],
-            [*arch[2], ridge_top - 3.0],
-            [*arch[0], ridge_top - 4.0],
+            [back[0] + 7.0, back[1] + 3.0, max(ground[7], infradentale[2]) + 4.0],
+            [back[0] + 2.5, back[1] - 3.0, 0.5 * ground[7] + 0.5 * max(ground[7], infradentale[2]) + 2.0],
+            *np.column_stack([arch, ground])[[6, 5, 4, 3, 2, 1, 0]],
         ],
         60,
     )
@@ -108,7 +105,7 @@ def make_mandible(skin: Mesh, groups: dict[str, np.ndarray], landmarks: dict[str
     space = BoneSpace(skin, groups, landmarks)
     low, high = mandible_box(space)
     mesh = surface_nets(mandible_field(space), low, high, cell=4.2)
-    return space.snapped(mesh, ("pg", "sl", "go_l", "go_r"), reach=12.0)
+    return space.kept_inside(space.snapped(mesh, ("pg", "sl", "go_l", "go_r"), reach=12.0))
 
 
 def make_jaw(skin: Mesh, groups: dict[str, np.ndarray], landmarks: dict[str, np.ndarray]) -> Jaw:

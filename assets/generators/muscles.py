@@ -139,7 +139,10 @@ class _Maker:
         flat = fibres.reshape(-1, 3)
         ends = np.zeros(fibres.shape[:2], bool)
         ends[:, [0, -1]] = True
-        moved = self.tissue.under_skin(self.tissue.out_of_bone(flat, clear), 1.0)
+        moved = flat
+        for _ in range(3):
+            moved = self.tissue.out_of_bone(moved, clear)
+            moved = self.tissue.under_skin(self.tissue.off_lining(moved, 0.6), 1.0)
         out = moved.reshape(fibres.shape)
         same = np.linalg.norm(fibres[:, -1] - fibres[:1, -1], axis=-1).max() < 1e-9
         if same:
@@ -186,7 +189,9 @@ class _Maker:
             y = np.where(off < radius * 0.93, ball, np.interp(x, [en[0], ex[0]], [en[1] + 3, ex[1] + 3]))
             rings.append(np.stack([x, y, z + slope * (x - middle[0])], axis=1))
         rings = _smoothed_ring(np.array(rings), 2)
-        flat = self.tissue.under_skin(rings.reshape(-1, 3), 0.8)
+        flat = rings.reshape(-1, 3)
+        for _ in range(3):
+            flat = self.tissue.off_lining(self.tissue.under_skin(flat, 1.0), 0.3)
         return flat.reshape(rings.shape), self.eye.centre + [0, -self.eye.radius, 0]
 
     def _lip_arc(self, text, count):
@@ -206,8 +211,8 @@ class _Maker:
         placed = self.tissue.laid(fibres, np.full(fibres.shape[1], 0.55))
         placed[:, 0], placed[:, -1] = end * [-1, 1, 1], end
         placed = evened(placed, 2)
-        placed = (placed + placed[:, ::-1] * [-1, 1, 1]) / 2
-        return placed, self.points["k:sto"] + [0.0, 4.0, 0.0]
+        placed = self._within((placed + placed[:, ::-1] * [-1, 1, 1]) / 2, 0.4)
+        return (placed + placed[:, ::-1] * [-1, 1, 1]) / 2, self.points["k:sto"] + [0.0, 4.0, 0.0]
 
 
 def _mirrored_middle(fibres, row):

@@ -5,7 +5,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ...sim.mesh import Mesh
-from .skull_depth import BoneSpace, _sampled
+from .skull_depth import BoneSpace, sampled
 
 #: Depth, mm, taken for the whole soft tissue where a ray inward meets no bone (cheek, neck).
 HOLLOW = 15.0
@@ -17,11 +17,12 @@ class Tissue:
     def __init__(self, space: BoneSpace, bones: list[Mesh], skin: Mesh, inner: np.ndarray):
         self._skin = cKDTree(space.points)
         self._skin_normal = space.directions
-        samples = [_sampled(mesh.vertices, mesh.triangles, 1.5) for mesh in bones]
+        samples = [sampled(mesh.vertices, mesh.triangles, 1.5) for mesh in bones]
         self._bone = cKDTree(np.concatenate([p for p, _ in samples]))
         self._bone_normal = np.concatenate([n for _, n in samples])
         lining = skin.triangles[inner[skin.triangles].all(axis=1)]
-        self._lining = cKDTree(_sampled(skin.vertices, lining, 1.5)[0])
+        points, self._lining_normal = sampled(skin.vertices, lining, 1.5)
+        self._lining = cKDTree(points)
 
     def foot(self, points):
         """(n, 3) place on the skin nearest to each point, and the skin's (n, 3) smooth outward direction there."""
@@ -80,6 +81,13 @@ class Tissue:
         normal = self._skin_normal[near]
         height = ((self._skin.data[near] - points) * normal).sum(1)
         return points - np.maximum(clear - height, 0)[:, None] * normal
+
+    def off_lining(self, points, clear):
+        """(n, 3): points nearer than ``clear`` mm to the lining of mouth or nose moved back into the flesh."""
+        distance, near = self._lining.query(points)
+        normal = self._lining_normal[near]
+        height = ((self._lining.data[near] - points) * normal).sum(1)
+        return points - np.where(distance < 8, np.maximum(clear - height, 0), 0)[:, None] * normal
 
 
 def evened(values, rounds, ends=True):

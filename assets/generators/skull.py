@@ -7,7 +7,7 @@ from ...sim.anatomy.head import SurfacePoints
 from ...sim.anatomy.landmark_names import SKULL
 from ...sim.mesh import Mesh
 from .mandible import mandible_box, mandible_field
-from .skull_depth import BoneSpace
+from .skull_depth import CLEARANCE, BoneSpace
 from .skull_field import carve, curve, ellipsoid, join, meet, plate, tube
 from .skull_nets import surface_nets
 
@@ -39,15 +39,31 @@ def skull_field(space: BoneSpace):
     base = po[2] - 18.0
 
     alveolus = np.column_stack([ARCH[:, 0], at["pr"][1] + 4.5 + ARCH[:, 1]])
-    ridge = curve(np.column_stack([alveolus, np.full(len(ARCH), at["pr"][2] + 3.0)]), 60)
-    ridge[:, 2] += 1.5 * np.linspace(0, 1, 60)
-    top = ridge + [0, 0, 10]
+    roof = np.maximum(space.mouth_limit(alveolus, +1) + CLEARANCE + 4.0, at["pr"][2] + 3.0)
+    ridge = curve(np.column_stack([alveolus, roof]), 60)
+    top = ridge + [0, 0, 8]
     rise = np.linspace(0, 1, 8)[:, None, None]
     alveolar = (ridge[None] + rise * (top - ridge)[None]).reshape(-1, 3)
     ridges = plate(alveolar, np.full(len(alveolar), 4.8))
 
     malar = malar_centre(space)
-    crest = np.array([alveolus[5, 0] + 2, alveolus[5, 1] - 2, at["pr"][2] + 10.0])
+    crest = np.array([alveolus[5, 0] + 2, alveolus[5, 1] - 2, roof[5] + 3.0])
+    # Nose bones: a roof from the midline down to the frontal processes of the maxilla.
+    ridge_line = curve([at["n"] + [0, 3.0, 5.0], at["n"] + [0, 2.8, 0], rhi - 2.8 * space.normals["rhi"]], 20)
+    nose_side = np.array([[8.0, n[1] + 7, n[2] + 1], [9.5, n[1] + 7, (n[2] + rhi[2]) / 2],
+                          [13.2, (n[1] + ans[1]) / 2 + 6, rhi[2] - 9.0], [15.0, ans[1] + 4, ans[2] + 6]])  # fmt: skip
+    eave = curve(nose_side[:3], 20)
+    across = np.linspace(0, 1, 12)[:, None, None]
+    shell = ridge_line + across * (eave - ridge_line) + np.array([0, -1.2, 0.6]) * 4 * across * (1 - across)
+    bridge = plate(shell.reshape(-1, 3), np.full(12 * 20, 2.8))
+
+    rim = np.array([[11.0, n[1] + 6, eye[2]], rim_side, at["os_l"], at["or_l"]])
+    rim_normal = np.linalg.svd(rim - rim.mean(axis=0))[2][-1]
+    rim_normal = rim_normal * np.sign(rim_normal[1])
+
+    def behind_rim(p):
+        return 3.0 - (p - rim.mean(axis=0)) @ rim_normal
+
     jaw = mandible_field(space)
     jaw_box = np.array(mandible_box(space))
 
@@ -59,8 +75,8 @@ def skull_field(space: BoneSpace):
         front = np.array([0.0, -0.62, -0.78])
         case = meet(case, (p - [0, po[1] - 42, base]) @ front, 25)
         # Temples: room for the temporal muscle.
-        temple = ellipsoid(p, [zy[0] + 13, rim_side[1] + 24, rim_side[2] + 4], (25, 30, 38))
-        return carve(case, temple, 14)
+        temple = ellipsoid(p, [zy[0] + 32, rim_side[1] + 26, rim_side[2] + 6], (44, 38, 50))
+        return carve(case, temple, 18)
 
     def field(points):
         p = points * [1, 1, 1]
@@ -75,19 +91,10 @@ def skull_field(space: BoneSpace):
                         [rim_side[0] - 6, (into["os_l"][1] + rim_side[1]) / 2 - 1, into["os_l"][2] - 3],
                         rim_side + [0, 0, 6], rim_side + [0.5, 0, -6]], [6.5, 5.5, 5.5, 5.2, 5.0, 4.6])  # fmt: skip
         bone = join(bone, brow, 8)
-        # Side wall of the orbit.
-        bone = join(bone, tube(p, [rim_side + [-1, 4, 0], [rim_side[0] - 11, rim_side[1] + 26, rim_side[2] - 3]], 6), 6)
-        # Nose bridge and the frontal processes of the maxilla.
-        bone = join(bone, tube(p, [into["n"] + [0, 3, 3], into["n"] + [0, 1.5, -4], into["rhi"] + [0, 1.0, 0]],
-                               [8.0, 6.5, 5.0]), 4)  # fmt: skip
-        side = tube(p, [[8.5, n[1] + 6, n[2] - 1], [13, n[1] + 5.5, (n[2] + ans[2]) / 2], [15.5, ans[1] + 5, ans[2] + 4]],
-                    [5.5, 5.0, 5.5])  # fmt: skip
-        bone = join(bone, side, 5)
         # Maxilla: body, alveolar ridge, palate.
         upper = ellipsoid(p, [21, at["or_l"][1] + 14, (at["or_l"][2] + ans[2]) / 2 - 1], (17, 17, 19))
         upper = join(upper, ridges(p), 7)
-        upper = join(upper, ellipsoid(p, [0, alveolus[4, 1] - 2, at["pr"][2] + 13], (25, 26, 5)), 5)
-        upper = join(upper, tube(p, [[0, ans[1] + 8, ans[2] - 2], [0, ans[1] + 1.8, ans[2]]], [4.0, 2.0]), 4)
+        upper = join(upper, ellipsoid(p, [0, alveolus[4, 1] - 2, roof[2] + 4], (25, 26, 5)), 5)
         bone = join(bone, upper, 6)
         # Cheekbone and arch.
         cheek = tube(p, [rim_side + [0, 0.5, -4], malar + [0.5, 0, 8], malar, into["or_l"] + [2, 1.0, -2]],
@@ -98,32 +105,44 @@ def skull_field(space: BoneSpace):
                         [po[0] - 1, po[1] - 2, po[2] + 6]],
                     [7.5, 5.4, 4.8, 4.8, 5.2, 6.5], ((1, 0, 0), 1.35))  # fmt: skip
         bone = join(join(bone, cheek, 6), arch, 5)
+        # Temporal bone around the ear canal.
+        bone = join(bone, ellipsoid(p, [po[0] - 9.5, po[1] - 1, po[2] + 4], (10, 15, 13)), 6)
         # Mastoid process behind the ear canal.
         bone = join(
-            bone, tube(p, [[po[0] - 4, po[1] + 16, po[2] + 2], [po[0] - 8, po[1] + 11, po[2] - 25]], [11, 5]), 7
+            bone, tube(p, [[po[0] - 4, po[1] + 16, po[2] + 2], [po[0] - 8, po[1] + 11, po[2] - 20]], [11, 5]), 7
         )
-        # Orbit, nasal aperture, great foramen.
-        depth = p[:, 1] - (eye[1] - 6)
-        share = np.clip(depth / 48, -0.35, 0.93)[:, None]
-        middle_at = np.array([eye[0] - 1.0, eye[2] + 1.5]) * (1 - share) + np.array([12.5, eye[2] + 3.0]) * share
-        half = np.array([20.0, 17.3]) * (1 - share**2 * np.sign(share)) + np.array([3.0, 3.0]) * share
-        ring = np.abs((p[:, [0, 2]] - middle_at) / np.maximum(half, 2.0))
-        orbit = ((ring**2.5).sum(1) ** 0.4 - 1) * half.min(1)
-        orbit = meet(orbit, depth - 44, 6)
-        bone = carve(bone, orbit, 3.0)
-        t = np.clip((rhi[2] + 1.5 - p[:, 2]) / (rhi[2] - ans[2]), 0, 1)
-        wide = 3.0 + 9.5 * np.sin(np.clip(t, 0, 1) * np.pi * 0.62) ** 0.9
-        nose = np.maximum(p[:, 0] - wide, np.maximum(p[:, 2] - rhi[2] - 1.0, ans[2] + 1.5 - p[:, 2]))
-        nose = meet(nose, p[:, 1] - (ans[1] + 38), 4)
+        # Orbits in walls of their own; the nasal aperture; the nose bones over it.
+        orbit = _orbit(p, eye)
+        bone = join(bone, meet(orbit - 6.5, behind_rim(p), 5), 5)
+        bone = carve(bone, orbit, 4.0)
+        t = np.clip((rhi[2] + 4 - p[:, 2]) / (rhi[2] + 4 - ans[2]), 0, 1)
+        wide = 4.0 + 8.5 * np.sin(t * np.pi * 0.62) ** 0.9
+        nose = np.maximum(p[:, 0] - wide, np.maximum(p[:, 2] - n[2] + 14, ans[2] + 1.5 - p[:, 2]))
+        nose = meet(nose, p[:, 1] - (ans[1] + 32), 4)
         bone = carve(bone, nose, 2.5)
+        bone = join(bone, bridge(p), 3)
+        side = tube(p, nose_side, [4.8, 5.0, 6.6, 5.6])
+        bone = join(bone, side, 4)
+        bone = join(bone, tube(p, [[0, ans[1] + 11, ans[2] - 4], [0, ans[1] + 3.2, ans[2] - 1.5]], [4.5, 3.4]), 4)
         bone = carve(bone, ellipsoid(p, [0, po[1] + 22, base - 2], (14, 17, 12)), 5)
         near = np.flatnonzero(bone < 12)
-        bone[near] = meet(bone[near], space.too_shallow(p[near]), 3)
+        bone[near] = meet(bone[near], space.too_shallow(p[near]), 4)
         near = near[((p[near] > jaw_box[0]) & (p[near] < jaw_box[1])).all(axis=1)]
         bone[near] = carve(bone[near], jaw(p[near]) - JOINT_GAP, 1.5)
         return bone
 
     return field
+
+
+def _orbit(p, eye):
+    """The orbit: a rounded four-sided cone, its axis turned inward behind the middle of the eye opening ``eye``."""
+    depth = p[:, 1] - (eye[1] - 6)
+    share = np.clip(depth / 48, -0.35, 0.93)[:, None]
+    middle = np.array([eye[0] - 1.0, eye[2] + 1.5]) * (1 - share) + np.array([13.5, eye[2] + 3.0]) * share
+    half = np.array([19.5, 17.0]) * (1 - share**2 * np.sign(share)) + np.array([3.0, 3.0]) * share
+    ring = np.abs((p[:, [0, 2]] - middle) / np.maximum(half, 2.0))
+    cone = ((ring**2.5).sum(1) ** 0.4 - 1) * half.min(1)
+    return meet(cone, depth - 40, 8)
 
 
 def make_skull(skin: Mesh, groups: dict[str, np.ndarray], landmarks: dict[str, np.ndarray]) -> Mesh:
@@ -132,9 +151,9 @@ def make_skull(skin: Mesh, groups: dict[str, np.ndarray], landmarks: dict[str, n
     at = space.targets
     low = np.array([-at["eu_l"][0] - 8, min(at["rhi"][1], at["g"][1]) - 8, at["pr"][2] - 10])
     high = np.array([at["eu_l"][0] + 8, at["op"][1] + 8, at["v"][2] + 8])
-    mesh = surface_nets(skull_field(space), low, high, 4.7, fine=((low[1], 18), (low[2], at["g"][2] + 6)))
+    mesh = surface_nets(skull_field(space), low, high, 5.0, fine=((low[1], 14), (low[2], at["g"][2] + 4)), growth=9.0)
     names = [name for name in SKULL if name not in ("pg", "sl", "go_l", "go_r")]
-    return space.snapped(mesh, names, reach=12.0)
+    return space.kept_inside(space.snapped(mesh, names, reach=12.0))
 
 
 def make_skull_landmarks(
@@ -154,7 +173,7 @@ def make_skull_landmarks(
 
 
 def _closest(point, mesh):
-    """Corners (3,) and weights (3,) of the closest point of a mesh, over all triangles at once (Ericson 2005, 5.1.5)."""
+    """Corners (3,) and weights (3,) of the closest point of a mesh (Ericson 2005, 5.1.5)."""
     a, b, c = (mesh.vertices[mesh.triangles[:, k]] for k in range(3))
     best = []
     edge_b, edge_c, to = b - a, c - a, point - a

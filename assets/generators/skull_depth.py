@@ -9,9 +9,17 @@ from scipy.spatial import cKDTree
 
 from ...sim.anatomy.tissue_depth import skin_counterparts, table
 from ...sim.mesh import Mesh, edges, vertex_normals
+from .skull_nets import mirror_index, symmetric
 
-#: Bone stays this far from any skin, the lining of the mouth included, mm.
-CLEARANCE = 2.5
+#: Bone stays this far from the lining of mouth, nose and lids, mm.
+CLEARANCE = 1.3
+
+#: Thin-skinned places between the landmarks of the table: skin landmarks to average -> mm (estimated).
+_BETWEEN = {
+    ("en",): 4.0, ("en", "n"): 3.5, ("en", "al"): 5.0, ("ex",): 5.0, ("ps",): 4.0, ("pi",): 4.0, ("se",): 5.0,
+    ("ex", "zy"): 7.0, ("tr",): 5.0, ("go", "gn"): 9.5, ("go", "gn", "gn"): 9.0,
+    ("se", "al"): 3.0, ("se", "se", "al"): 3.0, ("prn", "en"): 3.0, ("se", "en"): 3.5,
+}  # fmt: skip
 
 
 class BoneSpace:
@@ -29,15 +37,23 @@ class BoneSpace:
         inner = _weights(groups, "inner", skin) + _weights(groups, "mouth_bag", skin) > 0.5
         vertices = _without_ears(skin, _weights(groups, "ear_l", skin) + _weights(groups, "ear_r", skin))
         triangles = triangles[vertices[triangles, 2].max(axis=1) > self.landmarks["gn"][2] - 25]
-        outer = triangles[~inner[triangles].all(axis=1)]
-        self.points, self.directions = _sampled(vertices, outer, 2.5)
+        # Without the lips' and lids' edges: their skin faces inward and would not know outside from inside.
+        outer = triangles[~inner[triangles].any(axis=1)]
+        self.points, self.directions = sampled(vertices, outer, 2.5)
         self._tree = cKDTree(self.points)
-        self._all, self._all_directions = _sampled(vertices, triangles, 2.5)
+        self._all, self._all_directions = sampled(vertices, triangles, 2.5)
         self._all_tree = cKDTree(self._all)
+        lined = triangles[inner[triangles].all(axis=1)]
+        self._lining = sampled(vertices, lined, 2.5)[0] if len(lined) else np.zeros((0, 3))
         self._place_targets()
         known = {**skin_counterparts(self.landmarks), **self._extra_counterparts()}
-        self._depth_at = np.array([known[n] for n in known if not n.startswith(("po", "ans"))])
-        self._depth_of = np.array([table()[_base(n)].mean for n in known if not n.startswith(("po", "ans"))])
+        spots = [(known[n], table()[_base(n)].mean) for n in known if not n.startswith(("po", "ans"))]
+        for names, depth in _BETWEEN.items():
+            for side in ("_l", "_r"):
+                found = [self.landmarks.get(n + side, self.landmarks.get(n)) for n in names]
+                spots.append((np.mean(found, axis=0), depth))
+        self._depth_at = np.array([at for at, _ in spots])
+        self._depth_of = np.array([depth for _, depth in spots])
         self.depth = self._depth(self.points)
 
     def _extra_counterparts(self):
@@ -77,26 +93,45 @@ class BoneSpace:
         total = (np.exp(-((distance / radius) ** 2))[:, None] * self.directions[near]).sum(axis=0)
         return total / np.linalg.norm(total)
 
-    def depth_below(self, points):
-        """(n,) mm under the outer skin, negative outside."""
-        return _signed(points, self._tree, self.points, self.directions)[0]
-
-    def too_shallow(self, points, share=1.0):
-        """(n,) mm, positive where bone would be nearer to the skin than its depth there (times ``share``)."""
-        below, near = _signed(points, self._tree, self.points, self.directions)
+    def too_shallow(self, points):
+        """(n,) mm, positive where bone would be nearer to the skin than its depth there."""
+        distance, near = self._tree.query(points)
+        # Only the whole skin, linings included, tells inside from outside.
         clear = _signed(points, self._all_tree, self._all, self._all_directions)[0]
-        return np.maximum(share * self.depth[near] - below, CLEARANCE - clear)
+        below = np.where(clear > 0, distance, -distance)
+        return np.maximum(self.depth[near] - below, CLEARANCE - clear)
+
+    def mouth_limit(self, xy, rise, radius=3.0):
+        """(k,) z of the mouth's roof (``rise`` +1) or floor (-1): the farthest lining near places (k, 2) seen from above."""
+        level = self.landmarks["sto"][2]
+        lining = self._lining[(np.abs(self._lining[:, 2] - level) < 30) & (rise * (self._lining[:, 2] - level) > 0)]
+        if len(lining) == 0:
+            return np.full(len(xy), level + rise * 9.0)
+        tree = cKDTree(lining[:, :2])
+        found = [tree.query_ball_point(p, radius) or [tree.query(p)[1]] for p in np.asarray(xy)]
+        return np.array([rise * (rise * lining[near, 2]).max() for near in found])
+
+    def kept_inside(self, mesh: Mesh, clear=0.9) -> Mesh:
+        """``mesh`` with vertices that come too near to any skin moved inward."""
+        vertices, mirror = mesh.vertices.copy(), mirror_index(mesh.vertices)
+        for _ in range(5):
+            room, near = _signed(vertices, self._all_tree, self._all, self._all_directions)
+            move = np.where(room > -8, np.maximum(clear - room, 0), 0)
+            vertices -= move[:, None] * self._all_directions[near]
+            vertices = symmetric(vertices, mirror)
+        return mesh.moved(vertices)
 
     def snapped(self, mesh: Mesh, names, reach=18.0) -> Mesh:
         """``mesh`` gently pushed so that its surface passes through the targets named (symmetric)."""
-        vertices = mesh.vertices
+        vertices, mirror = mesh.vertices, mirror_index(mesh.vertices)
         for _ in range(4):
-            tree = cKDTree(_sampled(vertices, mesh.triangles, 1.0)[0])
+            tree = cKDTree(sampled(vertices, mesh.triangles, 1.0)[0])
             at = np.array([self.targets[n] for n in names])
             off = at - tree.data[tree.query(at)[1]]
             weight = np.exp(-((np.linalg.norm(at[:, None] - at[None], axis=2) / reach) ** 2))
             push = np.linalg.solve(weight + 1e-6 * np.eye(len(at)), off)
             vertices = vertices + np.exp(-((np.linalg.norm(vertices[:, None] - at[None], axis=2) / reach) ** 2)) @ push
+            vertices = symmetric(vertices, mirror)
         return mesh.moved(vertices)
 
 
@@ -108,7 +143,7 @@ def _weights(groups, name, skin):
     return np.asarray(groups.get(name, np.zeros(len(skin.vertices))), float)
 
 
-def _sampled(vertices, triangles, spacing):
+def sampled(vertices, triangles, spacing):
     """Points (k, 3) about ``spacing`` mm apart on a surface, and the smooth normals there."""
     normal = vertex_normals(vertices, triangles)
     corner, corner_normal = vertices[triangles], normal[triangles]

@@ -167,3 +167,8 @@ def _towards_surface(field, points, limit, step=0.4):
 def mirror_index(vertices):
     """(n,) index of each vertex's mirror image in x."""
     return cKDTree(vertices).query(vertices * [-1, 1, 1])[1]
+
+
+def symmetric(vertices, mirror):
+    """(n, 3) vertices averaged with their mirror images."""
+    return (vertices + vertices[mirror] * [-1, 1, 1]) / 2

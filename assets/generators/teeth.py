@@ -3,8 +3,10 @@
 
 import numpy as np
 from scipy.interpolate import LinearNDInterpolator
+from scipy.spatial import cKDTree
 
 from ...sim.mesh import Mesh
+from .skull_depth import sampled
 from .skull_field import curve
 from .teeth_shape import LOWER, UPPER, crown
 
@@ -33,6 +35,9 @@ class Mouth:
         self.front = float(middle[:, 1].min())
         self.back = float(bag[:, 1].max())
         self.half = float(bag[:, 0].max())
+        lining = skin.triangles[(np.asarray(groups["mouth_bag"])[skin.triangles] > 0.5).all(axis=1)]
+        points, self._wall_normals = sampled(skin.vertices, lining, 1.5)
+        self._walls = cKDTree(points)
         self.floor = float(bag[:, 2].min())
         high, low = bag[bag[:, 2] > self.line + 0.2], bag[bag[:, 2] < self.line - 0.2]
         self._ceiling = LinearNDInterpolator(high[:, :2], high[:, 2])
@@ -43,11 +48,21 @@ class Mouth:
         found = (self._ceiling if rise > 0 else self._ground)(xy)
         return np.where(np.isfinite(found), found, self.line + rise * 5.0)
 
+    def kept_in(self, mesh: Mesh, clear=0.4) -> Mesh:
+        """``mesh`` with the few vertices that touch the mouth's lining moved off it."""
+        vertices = mesh.vertices.copy()
+        for _ in range(3):
+            distance, near = self._walls.query(vertices)
+            height = ((vertices - self._walls.data[near]) * self._wall_normals[near]).sum(1)
+            move = np.where(distance < 6, np.maximum(clear - height, 0), 0)
+            vertices += move[:, None] * self._wall_normals[near]
+        return mesh.moved(vertices)
+
 
 def make_teeth(skin: Mesh, groups: dict[str, np.ndarray], landmarks: dict[str, np.ndarray]) -> tuple[Mesh, Mesh]:
     """(upper, lower) teeth with gums; materials index `MATERIALS["teeth_upper"]` (enamel, gum)."""
     mouth = Mouth(skin, groups, landmarks)
-    long = mouth.back - 1.5 - (mouth.front + LIP_GAP)
+    long = mouth.back - 3.0 - (mouth.front + LIP_GAP)
     scale = np.array([(mouth.half - 3.2) / ARCH[:, 0].max(), min(1.0, long / ARCH[-1, 1])])
     outer = curve(ARCH * scale, 400) + [0, mouth.front + LIP_GAP]
     edge = mouth.line - SHOW
@@ -56,7 +71,7 @@ def make_teeth(skin: Mesh, groups: dict[str, np.ndarray], landmarks: dict[str, n
     inward = _normals(outer)
     setback = np.interp(np.linspace(0, 1, len(outer)), [0, 0.25, 0.5, 1], [OVERJET, 2.4, 1.6, 1.4])
     lower = _row(LOWER, outer - inward * setback[:, None], edge + OVERBITE, -1, mouth)
-    return upper, lower
+    return mouth.kept_in(upper), mouth.kept_in(lower)
 
 
 def _row(teeth, outer, edge, rise, mouth):
@@ -104,7 +119,7 @@ def _row(teeth, outer, edge, rise, mouth):
 
 def _spee(share, rise):
     """Height of the biting edge along the row against that of the incisors, mm: canine tip, then the curve of Spee."""
-    heights = [0, -0.4, 0.0, 0.3, 0.6, 1.2, 1.9, 2.8] if rise > 0 else [0, 0, 0.5, -0.4, -0.6, -0.1, 0.7, 1.6]
+    heights = [0, -0.1, 0.2, 0.4, 0.6, 1.2, 1.9, 2.8] if rise > 0 else [0, -0.1, -0.9, -1.3, -1.4, -1.1, -0.3, 0.6]
     return float(np.interp(share * 8 - 0.5, np.arange(8), heights))
 
 
@@ -126,10 +141,11 @@ def _gum(necks, rise, mouth):
     station = np.arange(count) / 3
     papilla = 0.5 - 0.5 * np.cos(2 * np.pi * station)
     out /= np.linalg.norm(out, axis=1, keepdims=True)
-    sides = np.stack([place + out * thick[:, None], place, place - out * thick[:, None]])
-    limit = rise * np.min([rise * mouth.limit(xy, rise) for xy in sides], axis=0) - rise * 0.8
+    sides = np.stack([place + out * thick[:, None] * q for q in (-0.8, -0.4, 0.0, 0.4, 0.8)])
+    room = np.stack([rise * mouth.limit(xy, rise) for xy in sides])
+    limit = rise * room.max(axis=0)
     margin = neck - rise * (0.6 + 1.7 * papilla)
-    top = np.where(rise * (limit - neck) > 6.0, neck + rise * 6.0, limit)
+    top = np.where(rise * (limit - neck) > 9.0, neck + rise * 9.0, limit + rise * 1.5)
     turn = 2 * np.pi * np.arange(GUM_AROUND) / GUM_AROUND
     c, s = np.cos(turn), np.sin(turn)
     side = np.sign(c) * np.abs(c) ** 0.7 * (1 - 0.12 * s)
@@ -137,6 +153,8 @@ def _gum(necks, rise, mouth):
     swell = thick[:, None] * (1 - 0.08 * papilla[:, None]) * side[None]
     xy = place[:, None] + swell[..., None] * out[:, None]
     z = centre_z[:, None] + half_z[:, None] * s[None]
+    roof = mouth.limit(xy.reshape(-1, 2), rise).reshape(z.shape) - rise * 0.7
+    z = np.where(rise * (z - roof) > 0, roof, z)
     rings = np.concatenate([xy, z[..., None]], axis=2)
     vertices = np.concatenate([rings.reshape(-1, 3), [rings[0].mean(0), rings[-1].mean(0)]])
     n = GUM_AROUND
