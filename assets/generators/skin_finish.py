@@ -81,7 +81,7 @@ def _lids(layout: Layout, x: np.ndarray) -> None:
 
     # inner edge: on the ball, except at the corners
     room = (RADIUS + GAP) ** 2 - ((margin[:, [0, 2]] - centre[[0, 2]]) ** 2).sum(axis=1)
-    touch = np.clip(np.minimum((inner - 0.5) / 2.5, outer), 0, 1) * (room > 6)
+    touch = np.clip(np.minimum((inner - 0.5) / 1.5, outer), 0, 1) * (room > 6)
     margin[:, 1] = lerp(margin[:, 1], centre[1] - np.sqrt(np.maximum(room, 0)), touch)
     margin[14] = [centre[0] + 13.1, centre[1] - 1.2, margin[14, 2]]
     margin[2] = [centre[0] - 14.3, centre[1] - 8.4, margin[2, 2]]
