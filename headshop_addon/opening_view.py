@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How a file made on the command line looks when it is opened: the head fills the viewport, in its materials."""
+"""How a file made on the command line looks when it is opened: the head fills the viewport."""
 
 import bpy
 import numpy as np
@@ -22,7 +22,6 @@ def look_at(skin: bpy.types.Object) -> None:
                 space = area.spaces.active
                 space.clip_start = _NEAR
                 space.region_3d.view_location = centre
-                space.region_3d.view_distance = 2.6 * float((high - low).max())
+                space.region_3d.view_distance = 1.8 * float((high - low).max())
                 space.region_3d.view_rotation = _TURN.to_quaternion()
-                if screen.name == "Layout":
-                    space.shading.type = "MATERIAL"
+                space.overlay.show_extras = False  # the studio's lights would stand in front of the face
