@@ -199,10 +199,14 @@ def set_render(scene, width: int = 960, height: int = 1152, samples: int = 24, e
         cycles.adaptive_threshold = 0.06
         cycles.adaptive_min_samples = 4
         cycles.use_light_tree = False  # four lights: plain sampling is faster
-        cycles.use_denoising = True
-        cycles.denoiser = "OPENIMAGEDENOISE"
-        cycles.denoising_input_passes = "RGB_ALBEDO_NORMAL"
-        cycles.denoising_prefilter = "FAST"
+        try:
+            cycles.denoiser = "OPENIMAGEDENOISE"
+        except TypeError:  # a distribution's Blender may come without any denoiser: sample away the noise instead
+            cycles.use_denoising, cycles.samples = False, 8 * samples
+        else:
+            cycles.use_denoising = True
+            cycles.denoising_input_passes = "RGB_ALBEDO_NORMAL"
+            cycles.denoising_prefilter = "FAST"
         cycles.max_bounces = 4
         cycles.diffuse_bounces, cycles.glossy_bounces, cycles.transmission_bounces = 2, 2, 2
         cycles.transparent_max_bounces, cycles.volume_bounces = 6, 0
