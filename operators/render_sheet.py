@@ -25,8 +25,15 @@ class HEADSHOP_OT_render_sheet(Job, ExportHelper, bpy.types.Operator):
         return polls.library(cls, "scipy") and polls.head(cls, context) and polls.object_mode(cls, context)
 
     def invoke(self, context, event):
-        """Ask for the file, then render."""
+        """Ask for the file."""
+        self._asked = True
         return ExportHelper.invoke(self, context, event)
+
+    def execute(self, context):
+        """Render: under a timer where the file was asked for, at once for scripts."""
+        if getattr(self, "_asked", False):
+            return Job.invoke(self, context, None)
+        return Job.execute(self, context)
 
     def work(self, context):
         """Render."""

@@ -46,6 +46,7 @@ class HEADSHOP_PT_controls(_Sliders, bpy.types.Panel):
 
     def draw(self, context):
         """The jaw above, then left and right beside each other as on the screen."""
+        progress(self.layout, "muscles")
         group = active.skin(context).headshop.controls
         column = self.layout.column(align=True)
         for name in ("jaw_open", "jaw_forward", "jaw_side"):
@@ -60,6 +61,7 @@ class HEADSHOP_PT_controls(_Sliders, bpy.types.Panel):
 
 def _draw_region(self, context):
     """Each muscle's name, and under it its sides: the subject's right on the left, as one sees the face."""
+    progress(self.layout, "muscles")
     group = active.skin(context).headshop.muscles
     for names in muscle_names.by_region()[self.bl_label]:
         column = self.layout.column(align=True)

@@ -119,5 +119,5 @@ def scroll_up():
 
 
 def press(operator: str, across=0.4):
-    """Find the button that calls an operator (its name, and where it matters the beginning of its call), and click it."""
+    """Find the button that calls an operator (its name, or the beginning of its call) and click it."""
     click(*find(f"bpy.ops.headshop.{operator}", across=across))
