@@ -16,6 +16,8 @@ from .planes import Planes, empty_planes
 
 _ANGLES, _HEIGHTS = 96, 16
 _CLEARANCE = 0.25
+#: mm by which the wall draws back for each mm past the biting edge.
+_DRAW = 1.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,19 +42,25 @@ class Arch:
         return np.arctan2(rel[:, 0], -rel[:, 1]), far, radial
 
     def wall(self, angle, height):
-        """Radius of the wall (k,), its slope over the angle and over the height."""
+        """Radius of the wall (k,), its slope over the angle and over the height.
+
+        The gum goes on behind the row; past the biting edge the wall draws back, so that a lip may slip under it.
+        """
+        span = self.top - self.bottom
         a = (angle + np.pi) / (2 * np.pi) * _ANGLES - 0.5
-        z = (height - self.bottom) / (self.top - self.bottom) * (_HEIGHTS - 1)
-        inside = (z >= 0) & (z <= _HEIGHTS - 1)
-        z = np.clip(z, 0, _HEIGHTS - 1.001)
+        z = np.clip((height - self.bottom) / span * (_HEIGHTS - 1), 0, _HEIGHTS - 1.001)
         i, j = np.floor(a).astype(int), np.floor(z).astype(int)
         u, v = a - i, z - j
         i, k = i % _ANGLES, (i + 1) % _ANGLES
         r = self.radius
         low, high = r[i, j] * (1 - u) + r[k, j] * u, r[i, j + 1] * (1 - u) + r[k, j + 1] * u
         over_angle = ((r[k, j] - r[i, j]) * (1 - v) + (r[k, j + 1] - r[i, j + 1]) * v) * _ANGLES / (2 * np.pi)
-        over_height = (high - low) * (_HEIGHTS - 1) / (self.top - self.bottom)
-        return np.where(inside, low * (1 - v) + high * v, 0.0), over_angle, over_height
+        over_height = (high - low) * (_HEIGHTS - 1) / span
+        past = np.maximum(height - self.top, 0) if self.lower else np.maximum(self.bottom - height, 0)
+        beyond = (height < self.bottom) | (height > self.top)
+        over_height = np.where(past > 0, -_DRAW if self.lower else _DRAW, np.where(beyond, 0.0, over_height))
+        wall = low * (1 - v) + high * v
+        return np.where(wall > 0.6 * r.max(), np.maximum(wall - _DRAW * past, 0), 0.0), over_angle, over_height
 
 
 def build_arches(head: Head, layers: Layers) -> tuple[Arch, ...]:
@@ -60,7 +68,7 @@ def build_arches(head: Head, layers: Layers) -> tuple[Arch, ...]:
     n = len(layers.area)
     zero = np.zeros(n)
     near_mouth = np.zeros(n, bool)
-    for name in ("lip_upper", "lip_lower", "mouth_bag", "chin", "cheek_l", "cheek_r"):
+    for name in ("lip_upper", "lip_lower", "mouth_bag"):
         near_mouth |= np.asarray(head.groups.get(name, zero)) > 0.05
     near_mouth &= layers.free[:n]
     arches = []
@@ -85,14 +93,17 @@ def build_arches(head: Head, layers: Layers) -> tuple[Arch, ...]:
             maximum_filter(arch.radius, (5, 3), mode=("wrap", "nearest")), (3, 1), mode=("wrap", "nearest")
         )
         arch.radius[:] = gaussian_filter(closed, (1.0, 0.7), mode=("wrap", "nearest"))
+        # what narrows to the gum or to a pointed edge keeps at least most of the row's radius
+        crest = arch.radius.max(axis=1, keepdims=True)
+        arch.radius[:] = np.where(crest > 0, np.maximum(arch.radius, crest - 3.0), 0.0)
         column = np.flatnonzero(near_mouth & (np.linalg.norm(head.skin.vertices[:, :2] - centre, axis=1) < 75))
         skin = head.skin.vertices[column]
         angle, far, _ = arch.coordinates(skin)
         # at any height: what stands in front of the row where it is highest is in front of it
         ahead = arch.radius.max(axis=1)[np.floor((angle + np.pi) / (2 * np.pi) * _ANGLES).astype(int) % _ANGLES]
-        in_front = (ahead > 0) & (far > ahead - 1.5)
+        in_front = (ahead > 0.6 * arch.radius.max()) & (far > ahead - 1.5)
         wall, _, _ = arch.wall(angle, skin[:, 2])
-        clearance = np.where(wall > 0, np.minimum(far - wall, _CLEARANCE), np.minimum(far - ahead, _CLEARANCE))
+        clearance = np.minimum(far - np.where(wall > 0, wall, ahead), _CLEARANCE)
         arches.append(
             Arch(centre, low[2], high[2], arch.radius, column[in_front], clearance[in_front], "lower" in part)
         )
@@ -114,7 +125,7 @@ def arch_contacts(surfaces, positions, rotation, translation) -> Planes:
         angle, far, radial, wall = angle[keep], far[keep], radial[keep], wall[keep]
         tangent = np.stack([np.cos(angle), np.sin(angle), np.zeros(len(angle))], axis=1)
         slope = np.clip(over_angle[keep] / far, -0.7, 0.7)
-        rise = np.clip(over_height[keep], -0.5, 0.5)
+        rise = np.clip(over_height[keep], -0.7, 0.7)
         n = radial - slope[:, None] * tangent - rise[:, None] * [0.0, 0, 1]
         n /= np.linalg.norm(n, axis=1, keepdims=True)
         missing = (wall + arch.clearance[keep] - far) * np.einsum("ij,ij->i", n, radial)

@@ -108,7 +108,7 @@ def system_matrix(model: Model) -> dict:
     for lids in model.lids:
         lid[lids.column] += p.lid * lids.hold
     stretch = springs.gather @ sparse.diags(springs.stiffness) @ springs.difference
-    full = quadratic + stretch[: 2 * n, : 2 * n] + sparse.diags(lid)
+    full = quadratic + stretch[: 2 * n, : 2 * n] + sparse.diags(lid) + _volume_matrix(model)
     free = np.flatnonzero(layers.free)
     return {
         "quadratic": quadratic[free].tocsr(),
@@ -116,6 +116,28 @@ def system_matrix(model: Model) -> dict:
         "free": free,
         "gather": corner_gather(model.prisms, 3 * n),
     }
+
+
+def _volume_matrix(model: Model):
+    """Volume's share of the solver matrix, as springs: over the edges of each prism, along and across the layers."""
+    n = model.count
+    if not len(model.prisms):
+        return sparse.csr_matrix((2 * n, 2 * n))
+    k = model.parameters.volume
+    corner = model.layers.nodes[model.prisms]
+    side = corner[:, 1:3] - corner[:, :1]
+    area = np.linalg.norm(np.cross(side[:, 0], side[:, 1]), axis=1) / 2
+    height = model.prism_volume / np.maximum(area, 1e-6)
+    across = k * area**2 / (3 * model.prism_volume)
+    along = 0.25 * k * height
+    pairs = [((i, i + 3), across) for i in range(3)]
+    pairs += [((i + s, (i + 1) % 3 + s), along) for i in range(3) for s in (0, 3)]
+    first = np.concatenate([model.prisms[:, i] for (i, _), _ in pairs])
+    second = np.concatenate([model.prisms[:, j] for (_, j), _ in pairs])
+    weight = np.concatenate([w for _, w in pairs])
+    off = sparse.csr_matrix((weight, (first, second)), (2 * n, 2 * n))
+    off = off + off.T
+    return sparse.diags(np.asarray(off.sum(axis=1)).ravel()) - off
 
 
 def energy_gradient(model: Model, pose: Pose, planes: Planes, positions) -> tuple[float, np.ndarray]:

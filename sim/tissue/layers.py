@@ -18,6 +18,7 @@ from .structures import Layers
 #: Boneless places: depth in mm from skin to fascia, factor on the restoration, on the muscle-layer springs, on the
 #: sheet. Later rows win where groups overlap.
 _SOFT = {
+    "cheek": (3.5, 0.2, 0.15, 1.0),
     "mouth_bag": (1.2, 0.8, 0.3, 0.15),
     "lip_upper": (2.2, 0.4, 0.1, 0.45),
     "lip_lower": (2.2, 0.25, 0.1, 0.45),
@@ -27,8 +28,8 @@ _SOFT = {
     "ear": (1.5, 4.0, 1.0, 1.0),
     "neck": (4.0, 0.5, 0.5, 1.0),
 }
-#: Cheeks and all else without bone within reach.
-_CHEEK = (3.5, 0.2, 0.15)
+#: All else without bone within reach (the floor of the mouth, the neck under the jaw).
+_OTHER = (3.5, 0.5, 0.4)
 _REACH = 24.0
 
 
@@ -62,8 +63,8 @@ def build_layers(head: Head, parameters: Parameters) -> Layers:
     bone_normal[flip] *= -1
 
     soft = np.zeros(n)
-    depth = np.full(n, _CHEEK[0])
-    hold, layer, sheet = np.full(n, _CHEEK[1]), np.full(n, _CHEEK[2]), np.ones(n)
+    depth = np.full(n, _OTHER[0])
+    hold, layer, sheet = np.full(n, _OTHER[1]), np.full(n, _OTHER[2]), np.ones(n)
     for name, (d, h, m, e) in _SOFT.items():
         w = np.broadcast_to(_sides(groups, name), (n,))
         soft = np.maximum(soft, w)

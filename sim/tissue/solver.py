@@ -17,7 +17,8 @@ from .planes import Planes, project
 from .structures import Control, Model, Solution, State
 
 _MEMORY = 10
-_REFRESH = 6  # steps between searches for contacts
+#: Steps after which contacts are looked for again: ever more seldom, so that the last planes are solved to the end.
+_REFRESH = frozenset((4, 8, 13, 19, 27, 38, 53, 75, 105, 150))
 
 
 def rest_state(model: Model) -> State:
@@ -120,7 +121,7 @@ def _minimise(value, contacts, factor, free, positions, max_iterations, toleranc
     pairs = []
     residual, iterations = np.inf, 0
     for iterations in range(1, max_iterations + 1):
-        if iterations > 1 and (iterations - 1) % _REFRESH == 0:
+        if iterations - 1 in _REFRESH:
             planes = contacts(positions)
             energy, gradient = value(positions, planes)
         direction = -_two_loop(gradient, pairs, factor)
@@ -139,7 +140,9 @@ def _minimise(value, contacts, factor, free, positions, max_iterations, toleranc
             new_energy, new_gradient = value(moved, planes)
             if new_energy <= energy + 1e-4 * length * slope:
                 break
-            length *= 0.5
+            # the minimum of the parabola through both energies and the slope
+            curve = new_energy - energy - length * slope
+            length *= float(np.clip(-0.5 * length * slope / max(curve, 1e-30), 0.1, 0.6))
         else:
             if not pairs:
                 break
