@@ -54,9 +54,9 @@ def carry(reference: Head, fit: SkinFit) -> Work:
         old = reference.eyes[k]
         around = near_bone(reference, parts, old.centre[None], AROUND_EYE)
         lid = np.maximum(group(reference, f"lid_upper_{side}"), group(reference, f"lid_lower_{side}"))
-        new = eyeballs.place_eye(old, around, skin.vertices, fitted, lid, inner, scale)
+        new, turn = eyeballs.place_eye(old, around, skin.vertices, fitted, lid, inner, scale)
         eyes.append(new)
-        parts[f"eye_{side}"] = eyeballs.carried_eyeball(reference.parts[f"eye_{side}"].vertices, old, new)
+        parts[f"eye_{side}"] = eyeballs.carried_eyeball(reference.parts[f"eye_{side}"].vertices, old, new, turn)
     mouth = mouth_similarity(reference, parts, fitted, fit.outer)
     for name in (*TEETH, "tongue"):
         parts[name] = mouth(reference.parts[name].vertices)

@@ -4,14 +4,14 @@
 import numpy as np
 
 from ..anatomy.head import Eye
-from .thin_plate_spline import least_turn, similarity
+from .thin_plate_spline import similarity
 
 SMALLEST, LARGEST = 9.5, 13.0  # mm: from a child of one year to a large adult eye
 LID = 0.6  # mm of lid between the eyeball and the skin seen from outside
 
 
 def place_eye(eye: Eye, warped, reference_skin, fitted_skin, lid, inner, scale: float):
-    """The eye (an `Eye`) for a fitted skin.
+    """The eye (an `Eye`) for a fitted skin, and the rotation (3, 3) that takes the reference's eye to it.
 
     Parameters
     ----------
@@ -27,11 +27,12 @@ def place_eye(eye: Eye, warped, reference_skin, fitted_skin, lid, inner, scale: 
     turn, _ = similarity(axes, warped(axes))
     turn = turn / np.cbrt(np.linalg.det(turn))
     gaze = turn @ eye.gaze
+    gaze = gaze / np.linalg.norm(gaze)
     centre = warped(eye.centre[None])[0]
     gap = np.linalg.norm(reference_skin - eye.centre, axis=1) - eye.radius
     near = np.flatnonzero((lid > 0.3) & (gap < 0.35 * eye.radius) & ((reference_skin - eye.centre) @ eye.gaze > 0))
     if len(near) < 6:
-        return Eye(centre, radius, gaze / np.linalg.norm(gaze))
+        return Eye(centre, radius, gaze), turn
     want = np.maximum(gap[near], np.where(inner[near], 0.1, LID))
     points, prior = fitted_skin[near], centre.copy()
     for _ in range(30):
@@ -46,12 +47,11 @@ def place_eye(eye: Eye, warped, reference_skin, fitted_skin, lid, inner, scale: 
         centre = centre + step
         if np.linalg.norm(step) < 1e-4:
             break
-    return Eye(centre, radius, gaze / np.linalg.norm(gaze))
+    return Eye(centre, radius, gaze), turn
 
 
-def carried_eyeball(vertices, old: Eye, new: Eye) -> np.ndarray:
-    """The eyeball's vertices (n, 3): the same rigid shape, scaled to the new radius and turned to the new gaze."""
-    turn = least_turn(old.gaze, new.gaze)
+def carried_eyeball(vertices, old: Eye, new: Eye, turn) -> np.ndarray:
+    """The eyeball's vertices (n, 3): the same rigid shape, scaled to the new radius and turned by ``turn`` (3, 3)."""
     return (vertices - old.centre) @ turn.T * (new.radius / old.radius) + new.centre
 
 
