@@ -202,7 +202,7 @@ def set_render(scene, width: int = 960, height: int = 1152, samples: int = 24, e
         try:
             cycles.denoiser = "OPENIMAGEDENOISE"
         except TypeError:  # a distribution's Blender may come without any denoiser: sample away the noise instead
-            cycles.use_denoising, cycles.samples = False, 8 * samples
+            cycles.use_denoising, cycles.samples = False, 4 * samples
         else:
             cycles.use_denoising = True
             cycles.denoising_input_passes = "RGB_ALBEDO_NORMAL"
