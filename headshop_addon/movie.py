@@ -11,7 +11,7 @@ from ..sim.errors import InputError
 from ..sim.progress import Progress, Work
 from . import heads
 from .outputs import Outputs
-from .pictures import render_to
+from .pictures import render_frame
 from .quiet import quiet
 from .studio import studio
 
@@ -42,17 +42,17 @@ def render_movie(
     fps, base = bpy.context.scene.render.fps, bpy.context.scene.render.fps_base
     with Outputs() as outputs, tempfile.TemporaryDirectory(prefix="headshop-") as folder:
         target = outputs.file(path)
-        pictures = [Path(folder) / f"{number:05d}.png" for number in range(last - first + 1)]
+        pictures = []
         stage = {"width": size[0], "height": size[1], "samples": samples, "engine": engine, "yaw": yaw, "close": True}
         with _values_kept(skin), studio(skin, **stage) as (scene, _):
             scene.render.fps, scene.render.fps_base = fps, base
             for part, obj in heads.parts_of(skin).items():
                 if part not in ("skull", "mandible"):
                     scene.collection.objects.link(obj)
-            for number, picture in enumerate(pictures):
-                yield Progress(0.97 * number / len(pictures), f"Rendering frame {first + number} of {last}")
-                scene.frame_set(first + number)
-                render_to(scene, picture)
+            for frame in range(first, last + 1):
+                done = (frame - first) / (last - first + 1)
+                yield Progress(0.97 * done, f"Rendering frame {frame} of {last}")
+                pictures.append(render_frame(scene, frame, folder))
         yield Progress(0.97, "Writing the film")
         encode(pictures, target, size, fps, base)
     return path

@@ -36,20 +36,30 @@ def write_picture(path, pixels: np.ndarray) -> None:
         bpy.data.images.remove(image)
 
 
-def render_to(scene, path) -> None:
-    """Render the scene's current frame into a PNG file; its output settings become PNG, 8 bits."""
+def _as_png(scene) -> None:
+    """Set the scene to write PNG, 8 bits."""
     settings = scene.render.image_settings
     if hasattr(settings, "media_type"):  # since 5.0
         settings.media_type = "IMAGE"
     settings.file_format, settings.color_mode, settings.color_depth, settings.compression = "PNG", "RGB", "8", 15
-    scene.render.filepath = str(path)
+
+
+def render_frame(scene, frame: int, folder) -> Path:
+    """Render one frame of the scene's animation into a PNG file in ``folder``; returns its path."""
+    _as_png(scene)
+    # A still of a scene that is not in a window does not move to its frame: ask for an animation of one frame.
+    scene.frame_start = scene.frame_end = frame
+    scene.render.filepath = str(Path(folder) / "######")
     with quiet():
-        bpy.ops.render.render(write_still=True, scene=scene.name)
+        bpy.ops.render.render(animation=True, scene=scene.name)
+    return Path(scene.render.frame_path(frame=frame))
 
 
 def render_picture(scene) -> np.ndarray:
-    """Render the scene's current frame: (height, width, 4) float32 0..1, display values, top row first."""
+    """Render a still of the scene: (height, width, 4) float32 0..1, display values, top row first."""
+    _as_png(scene)
     with tempfile.TemporaryDirectory(prefix="headshop-") as folder:
-        path = Path(folder) / "still.png"
-        render_to(scene, path)
-        return read_picture(path)
+        scene.render.filepath = str(Path(folder) / "still.png")
+        with quiet():
+            bpy.ops.render.render(write_still=True, scene=scene.name)
+        return read_picture(scene.render.filepath)
