@@ -19,7 +19,7 @@ _LID_WORK = {
     "levator_palpebrae": (-0.32, 0.0),
     "orbicularis_oculi_palpebral": (0.22, 2.6),
     "orbicularis_oculi_lacrimal": (0.03, 0.1),
-    "orbicularis_oculi_orbital": (0.08, 1.2),
+    "orbicularis_oculi_orbital": (0.12, 1.7),
 }
 #: Jaw motion by fully contracted muscles of both sides: (open, forward); one side alone also moves the jaw sideways,
 #: away from it. Closers pull against opening.

@@ -164,5 +164,5 @@ def lip_contacts(surfaces: Surfaces, positions, reference) -> Planes:
         node.append(own[keep])
         partner.append(mate[keep])
         normal.append(facing[keep])
-        level.append(np.minimum(rest_gap[keep], 0.05))
+        level.append(np.minimum(rest_gap[keep], 0.4))
     return Planes(*(np.concatenate(x) for x in (node, normal, level, partner)))

@@ -97,6 +97,10 @@ def build_layers(head: Head, parameters: Parameters) -> Layers:
     jaw = groups.get("jaw", np.zeros(n))
     mandible = np.where(bony, nearer.astype(float), jaw)
     movable = face > 0.02
+    for muscle in head.muscles:  # and where muscles of scalp and ears end
+        if muscle.name.startswith(("auricularis", "occipitalis")):
+            end = muscle.fibres[:, -max(1, muscle.fibres.shape[1] // 2) :].reshape(-1, 3)
+            movable |= cKDTree(end).query(v)[0] < 16
     return Layers(
         nodes=np.concatenate([v, fascia, bone]),
         area=area,

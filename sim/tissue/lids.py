@@ -14,7 +14,7 @@ from .structures import Lids
 #: Share of the opening that the lower lid covers in a blink (the upper lid does the rest).
 LOWER_SHARE = 0.12
 #: Closed lids press on each other: rad beyond the first touch, against the rounding of their edges.
-_SEAL = 0.03
+_SEAL = 0.012
 
 
 def eye_profile(vertices: np.ndarray, eye: Eye) -> tuple[np.ndarray, np.ndarray]:
