@@ -6,7 +6,10 @@ import bpy
 
 from .shader_nodes import Graph, socket
 
-EYE = "headshop_eye"
+EYE, IRIS = "headshop_eye", "headshop_iris"
+
+#: Linear colour of an iris whose own is not known: grey-green.
+IRIS_COLOUR = (0.12, 0.135, 0.105)
 
 
 def eye_material(kind: str) -> bpy.types.Material:
@@ -70,21 +73,14 @@ def _iris(graph: Graph) -> None:
     crypts = graph.noise(graph.vector("ADD", graph.vector("SCALE", angle, 2.2), graph.combine(z=along)), 2.2, 2.0, 0.5)
     # The collarette, a frilled ring a third of the way out, is where the inner colour ends.
     frill = graph.math("ADD", along, graph.smooth(streak, 0.3, 0.7, -0.10, 0.10))
-    colour = graph.ramp(
-        frill,
-        [
-            (0.0, (0.10, 0.055, 0.025)),
-            (0.20, (0.30, 0.17, 0.075)),
-            (0.40, (0.25, 0.225, 0.14)),
-            (0.75, (0.17, 0.215, 0.20)),
-            (1.0, (0.12, 0.16, 0.165)),
-        ],
-    )
+    own = graph.attribute(IRIS, "Color")
+    warm = graph.mix(0.5, own, (0.24, 0.125, 0.05))
+    colour = graph.mix(graph.smooth(frill, 0.12, 0.45), warm, own)
     colour = graph.mix(
         1.0, colour, graph.ramp(streak, [(0.30, (0.42, 0.42, 0.42)), (0.68, (1.7, 1.7, 1.7))]), "MULTIPLY"
     )
     colour = graph.mix(graph.smooth(crypts, 0.50, 0.66, 0.0, 0.35), colour, (0.05, 0.045, 0.04))
-    colour = graph.mix(graph.smooth(along, 0.72, 1.0, 0.0, 0.93), colour, (0.012, 0.014, 0.016))  # limbal ring
+    colour = graph.mix(graph.smooth(along, 0.60, 0.97, 0.0, 0.95), colour, (0.012, 0.014, 0.016))  # limbal ring
     colour = graph.mix(graph.smooth(along, 0.0, 0.07, 0.85, 0.0), colour, (0.01, 0.008, 0.006))  # ruff of the pupil
     # Light gathers in the iris through the cornea; a trace of emission stands for it.
     shader = graph.node(

@@ -12,8 +12,8 @@ from ..sim.anatomy.head import MATERIALS, Eye, Head, Muscle
 from ..sim.mesh import Mesh
 from . import bridge, heads
 from .anatomy_materials import FIBRE, REST, anatomy_material
-from .eye_materials import EYE, eye_material
-from .scan_colour import ScanColour, colour_image
+from .eye_materials import EYE, IRIS, IRIS_COLOUR, eye_material
+from .scan_colour import ScanColour, colour_image, iris_colour
 from .skin_material import COLOUR, skin_material
 from .skin_paint import paint_skin, write_vectors
 
@@ -31,15 +31,19 @@ def dress_head(skin: bpy.types.Object) -> None:
     """
     head = heads.read_head(skin)
     axes = head_axes(head)
+    scan = _coloured_scan(skin)
+    iris = None if scan is None else iris_colour(scan, head.eyes)
     objects = heads.parts_of(skin)
     for part, obj in objects.items():
         mesh = head.parts[part]
         place = mesh.vertices @ axes.T
         if part == "skin":
             paint_skin(obj, mesh, head.groups, place, {n: axes @ p for n, p in head.landmark_positions().items()})
-            own = _scan_skin(skin, mesh, head.groups["inner"])
+            own = None if scan is None else _scan_skin(skin, mesh, scan, head.groups["inner"])
         elif part in ("eye_l", "eye_r"):
             write_vectors(obj.data, EYE, eye_coordinates(mesh, head.eyes[part == "eye_r"], axes[2]))
+            colour = (*(IRIS_COLOUR if iris is None else iris), 1.0)
+            write_vectors(obj.data, IRIS, np.tile(colour, (len(place), 1)))
         else:
             write_vectors(obj.data, REST, place)
         _fill_slots(obj, [own if part == "skin" and own else _material(kind) for kind in MATERIALS[part]])
@@ -62,8 +66,8 @@ def head_axes(head: Head) -> np.ndarray:
     return np.array([left, back, np.cross(left, back)])
 
 
-def _scan_skin(skin: bpy.types.Object, mesh: Mesh, inner: np.ndarray) -> bpy.types.Material | None:
-    """A skin material of the head's own that shows its scan's colours; None if the scan has none or is gone."""
+def _coloured_scan(skin: bpy.types.Object) -> Mesh | None:
+    """The head's scan where the skin stands, mm in the skin's space; None if it has no colours or is gone."""
     scan = heads.scan_of(skin)
     if scan is None:
         return None
@@ -72,9 +76,13 @@ def _scan_skin(skin: bpy.types.Object, mesh: Mesh, inner: np.ndarray) -> bpy.typ
     if seen.colour is None or not len(seen.faces):
         return None
     matrix = np.array(skin.matrix_world.inverted() @ scan.matrix_world)
-    seen = seen.moved(seen.vertices @ matrix[:3, :3].T + matrix[:3, 3] / bridge.METRES)
+    return seen.moved(seen.vertices @ matrix[:3, :3].T + matrix[:3, 3] / bridge.METRES)
+
+
+def _scan_skin(skin: bpy.types.Object, mesh: Mesh, scan: Mesh, inner: np.ndarray) -> bpy.types.Material | None:
+    """A skin material of the head's own that shows its scan's colours; None if the scan lies elsewhere."""
     name = heads.head_name(skin)
-    painted = colour_image(mesh, ScanColour(seen), inner, f"{name} Colour")
+    painted = colour_image(mesh, ScanColour(scan), inner, f"{name} Colour")
     if painted is None:
         return None
     image, colour = painted
@@ -105,17 +113,21 @@ def eye_coordinates(mesh: Mesh, eye: Eye, up: np.ndarray) -> np.ndarray:
     offset = mesh.vertices - eye.centre
     flat = np.column_stack([offset @ side, offset @ np.cross(-gaze, side)])
     radius = np.linalg.norm(flat, axis=1)
+    depth = offset @ gaze
     # behind the eye's equator go on outwards, so that veins do not return to the middle of the gaze
-    reach = eye.radius
-    behind = np.maximum(-(offset @ gaze), 0.0)
-    flat *= ((radius + behind) / np.maximum(radius, 1e-9))[:, None]
+    flat *= ((radius + np.maximum(-depth, 0.0)) / np.maximum(radius, 1e-9))[:, None]
 
-    def rim(kind: str, otherwise: float) -> float:
-        faces = mesh.faces[mesh.material == MATERIALS["eye_l"].index(kind)] if mesh.material is not None else []
-        return float(radius[faces[faces >= 0]].max()) if len(faces) else otherwise
+    def radii(kind: str) -> np.ndarray:
+        """Radii of the vertices in front of the equator that faces of a material use."""
+        faces = mesh.faces[mesh.material == MATERIALS["eye_l"].index(kind)] if mesh.material is not None else mesh.faces
+        used = np.unique(faces[faces >= 0])
+        return radius[used[depth[used] > 0]]
 
-    iris = rim("iris", 0.48 * reach)
-    pupil = rim("pupil", 0.4 * iris)
+    # an iris may go on a little under the white: what is seen of it ends where the white begins
+    iris = min(radii("iris").max(initial=0.0), radii("sclera").min(initial=np.inf))
+    iris = iris if 0.2 * eye.radius < iris < 0.8 * eye.radius else 0.48 * eye.radius
+    pupil = radii("pupil").max(initial=0.0)
+    pupil = pupil if 0.1 * iris < pupil < 0.9 * iris else 0.38 * iris
     return np.column_stack([flat / iris, np.full(len(flat), pupil / iris)])
 
 

@@ -51,7 +51,7 @@ def test_eye_coordinates_end_at_the_iris(reference):
     place = eye_coordinates(mesh, eye, np.array([0.0, 0.0, 1.0]))
     radius = np.linalg.norm(place[:, :2], axis=1)
     iris = np.unique(mesh.faces[mesh.material == MATERIALS["eye_l"].index("iris")])
-    assert radius[iris[iris >= 0]].max() == pytest.approx(1.0)
+    assert radius[iris[iris >= 0]].max() == pytest.approx(1.0, abs=1e-3)
     assert 0.15 < place[0, 2] < 0.6
     back = (mesh.vertices - eye.centre) @ eye.gaze < -0.8 * eye.radius
     assert radius[back].min() > 1.5
@@ -168,3 +168,25 @@ def test_staging_twice_leaves_one_stage(bpy, skin):
     set_stage(bpy.context.scene, skin, yaw=-20.0)
     assert len(bpy.data.objects) == objects
     assert bpy.context.scene.camera.name in bpy.context.scene.objects
+
+
+def test_the_iris_takes_the_scans_colour_only_where_an_eye_was_seen(reference):
+    pytest.importorskip("bpy")
+    from headshop.headshop_addon.scan_colour import iris_colour, to_srgb
+    from headshop.sim.mesh import Mesh
+
+    skin = reference.skin.vertices
+    eyes = [reference.parts[part].vertices for part in ("eye_l", "eye_r")]
+    vertices = np.concatenate([skin, *eyes])
+    tone = np.tile((0.4, 0.25, 0.18), (len(vertices), 1))
+
+    def scan(eye_colour):
+        colour = tone.copy()
+        colour[len(skin) :] = eye_colour
+        return Mesh(vertices, np.zeros((0, 4), np.int32), colour=to_srgb(colour))
+
+    blue = iris_colour(scan((0.05, 0.08, 0.14)), reference.eyes)
+    np.testing.assert_allclose(blue / blue[2], (0.05 / 0.14, 0.08 / 0.14, 1.0), atol=0.02)
+    brown = iris_colour(scan((0.05, 0.03, 0.02)), reference.eyes)
+    assert brown is not None and brown[0] > brown[2]
+    assert iris_colour(scan((0.38, 0.24, 0.17)), reference.eyes) is None
