@@ -12,15 +12,18 @@ from ..anatomy.tissue_depth import tissue_vectors
 from ..progress import Progress, Work
 from . import bone, eyeballs
 from .closest import Surface
-from .openings import rims, sealed_lids
+from .openings import lips_apart, rims, sealed_lids
 from .refine import scattered, thinned
 from .skin_fit import SkinFit, group
 from .thin_plate_spline import System, ThinPlateSpline, similarity
+from .untangle import untangled
 
 BONES = ("skull", "mandible")
 TEETH = ("teeth_upper", "teeth_lower")
 AROUND_EYE = 32.0  # mm: bone this near carries the eye
 AROUND_TEETH = 28.0
+BEHIND_LIPS = 12.0  # mm: teeth this near to the skin have lips or cheeks over them
+LIP_LEFT = 0.75  # share of that distance that must remain
 COARSE = 14.0  # mm between centres of the last warps, away from lids and lips
 GAPS = (("skull", 18.0), ("mandible", 12.0), ("eye_l", 7.0), ("eye_r", 7.0), ("teeth_upper", 8.0), ("teeth_lower", 8.0))
 BUSY = ("lip_upper", "lip_lower") + tuple(f"{x}_{s}" for x in ("lid_upper", "lid_lower", "nostril") for s in ("l", "r"))
@@ -65,10 +68,18 @@ def carry(reference: Head, fit: SkinFit) -> Work:
     between = Between(reference)
     final = fitted.copy()
     final[inner] = between.warp(parts, fitted).transform(skin.vertices[inner])
+    final = lips_apart(reference, final, inner, size)
     for k, side in enumerate(("l", "r")):
         if side in fit.closed:
             final = sealed_lids(reference, rims(reference), final, eyes[k], side)
         final = lids_on_eye(reference, final, parts[f"eye_{side}"], eyes[k], k, side, inner)
+
+    yield Progress(0.45, "Untangle the skin")
+    shut = np.zeros(len(final), dtype=bool)
+    for side in fit.closed:  # closed lids lie too close for the reference's open ones to be restored
+        for lid in ("lid_upper", "lid_lower"):
+            shut |= group(reference, f"{lid}_{side}") > 0.2
+    final = untangled(skin.vertices, final, skin.faces, triangles, ~inner, shut)
 
     yield Progress(0.5, "Bone under the skin")
     surface = Surface(final, triangles)
@@ -135,20 +146,27 @@ def mouth_similarity(reference: Head, parts, fitted, outer):
     """
     teeth = np.concatenate([reference.parts[name].vertices for name in TEETH])
     with_bone = near_bone(reference, parts, teeth, AROUND_TEETH)
-    teeth = teeth[scattered(teeth, 4.0)]
-    before = Surface(reference.skin.vertices, outer).closest(teeth)
-    moved = with_bone(teeth)
-    after = Surface(fitted, outer).closest(moved)
-    front = before.distance < np.percentile(before.distance, 30)
-    lack = 0.7 * before.distance[front] - after.distance[front]
-    back = max(0.0, float(np.percentile(lack, 95)))
-    if back:
-        inward = (moved[front] - after.points[front]) / np.maximum(after.distance[front, None], 1e-9)
-        way = inward.mean(axis=0)
-        back_shift = back * way / max(np.linalg.norm(way), 1e-9)
-    else:
-        back_shift = np.zeros(3)
-    return lambda x: with_bone(x) + back_shift
+    teeth = teeth[scattered(teeth, 3.0)]
+    before = room_over(teeth, Surface(reference.skin.vertices, outer))[0]
+    teeth, before = teeth[before < BEHIND_LIPS], before[before < BEHIND_LIPS]
+    lips = Surface(fitted, outer)
+    shift = np.zeros(3)
+    for _ in range(4):
+        after, inward = room_over(with_bone(teeth) + shift, lips)
+        lack = np.where(np.abs(after) < BEHIND_LIPS, LIP_LEFT * before - after, 0.0)
+        short = float(np.percentile(lack, 98)) if len(lack) else 0.0
+        if short < 0.1:
+            break
+        way = inward[lack > 0].mean(axis=0)
+        shift = shift + short * way / max(float(np.linalg.norm(way)), 0.3)
+    return lambda x: with_bone(x) + shift
+
+
+def room_over(points, skin: Surface):
+    """(k,) mm from points (k, 3) out to the skin, negative outside, and (k, 3) the way in."""
+    found = skin.closest(points)
+    height = np.einsum("ij,ij->i", found.points - points, found.normals)
+    return np.where(height < 0, -found.distance, found.distance), -found.normals
 
 
 class Between:

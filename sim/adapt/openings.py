@@ -59,6 +59,29 @@ def lip_linings(reference: Head, gap: float = 3.0) -> np.ndarray:
     return pairs[between.min(axis=1) < gap]
 
 
+def lips_apart(reference: Head, skin, inner, matrix) -> np.ndarray:
+    """Skin vertices (n, 3) with the linings of the lips no closer to each other than half as on the reference.
+
+    matrix (3, 3) turns and scales the reference into the scan's place.
+    """
+    pairs = lip_linings(reference, 6.0)
+    if len(pairs) == 0:
+        return skin
+    out = np.array(skin)
+    rest = (reference.skin.vertices[pairs[:, 0]] - reference.skin.vertices[pairs[:, 1]]) @ matrix.T
+    length = np.linalg.norm(rest, axis=1)
+    way = rest / np.maximum(length, 1e-9)[:, None]
+    for _ in range(4):
+        lack = 0.5 * length - np.einsum("ij,ij->i", out[pairs[:, 0]] - out[pairs[:, 1]], way)
+        push = np.maximum(lack, 0)[:, None] * way / 2
+        for rows, sign in ((pairs[:, 0], 1.0), (pairs[:, 1], -1.0)):
+            count = np.bincount(rows, minlength=len(out))
+            for axis in range(3):
+                total = np.bincount(rows, sign * push[:, axis], minlength=len(out))
+                out[:, axis] += np.where(inner, total / np.maximum(count, 1), 0)
+    return out
+
+
 def lid_pairs(reference: Head, rim, side: str):
     """Vertices of the upper lid's margin, and between which two of the lower one each comes to lie when closed.
 
