@@ -152,14 +152,13 @@ def _lips(layout: Layout, x: np.ndarray) -> None:
     skin, border, red, edge, meet = (x[ring[k]].copy() for k in (2, 3, 4, 5, 6))
     line, front = 0.5 * (meet + meet[partner]), 0.5 * (edge + edge[partner])
     line[:, 1] = lerp(line[:, 1], front[:, 1], 0.9 * full)
-    red[:, 1] -= np.where(above > 0, 1.0, 1.1) * full
-    edge[:, 1] = lerp(red[:, 1], line[:, 1], 0.34) - 0.25 * full
-    edge[:, 2] = line[:, 2] + above * np.where(above > 0, 1.15, 1.45) * full
-    border[:, 1] -= 0.45 * full
-    border[:, 2] += np.where(above < 0, 1.5, 0) * full  # means of red heights by the growth table
-    red[:, 2] += np.where(above < 0, 0.6, 0) * full
-    skin[:, 2] += np.where(above < 0, 0.7, 0) * full
-    skin[:, 1] += 0.2 * full
+    lower = np.where(above < 0, 1.0, 0.0) * full
+    upper = np.where(above > 0, 1.0, 0.0) * full
+    red += np.stack([0 * full, -1.0 * upper - 1.3 * lower, -0.3 * lower], axis=1)
+    edge[:, 1] = lerp(red[:, 1], line[:, 1], 0.36) - 0.3 * upper - 0.2 * lower
+    edge[:, 2] = line[:, 2] + 0.95 * upper - 1.2 * lower
+    border += np.stack([0 * full, -0.45 * upper - 1.0 * lower, 0.7 * lower], axis=1)
+    skin += np.stack([0 * full, 0.2 * upper - 0.1 * lower, 0.3 * lower], axis=1)
     up = np.zeros((32, 3))
     up[:, 2] = above
     back = line * [0.985, 1, 1]

@@ -66,8 +66,19 @@ class _Painter:
         return out
 
 
+#: Jaw weight of the lip by steps from the mouth's corner downward: the opening becomes an oval.
+_LIP_CORNER = (0.5, 0.73, 0.88, 0.97)
+
+
+def _corners(p: _Painter):
+    """Lip and bag vertices near the corners with their jaw weights."""
+    for step, weight in enumerate(_LIP_CORNER):
+        yield p.ring("mouth", 3, 10, (19 - step, 3 + step)), weight
+        yield p.ring("mouth", 3, 10, (19 + step, 3 - step)), 1 - weight
+
+
 def _jaw(p: _Painter) -> np.ndarray:
-    lower, upper = range(5, 18), range(21, 34)
+    lower, upper = range(7, 16), range(23, 32)
     return p.field(
         (p.layout.crown, 0),
         (p.grid(0, HALF, 0, 9), 0),
@@ -79,10 +90,10 @@ def _jaw(p: _Painter) -> np.ndarray:
         (p.ring("mouth", 0, 10, upper), 0),
         (p.ring("mouth", 0, 0, (*range(22, 33),)), 0),
         (p.ring("mouth", 1, 10, lower), 1),
+        *_corners(p),
         (p.grid(0, 6, 22, 25), 1),
         (p.grid(7, 10, 23, 25), 1),
         (p.grid(11, 13, 23, 25), 0.8),
-        (p.ring("mouth", 3, 7, (3, 19)), 0.5),
         (p.layout.patches["mouth"][0], 0),
         (p.layout.patches["mouth"][1], 0.5),
         (p.layout.patches["mouth"][2], 1),
