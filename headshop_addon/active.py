@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which scan and which head the sidebar and the operators work on."""
+"""Which scan and which head the sidebar and the operators work on, and what is seen of it."""
 
 import bpy
 
@@ -21,3 +21,12 @@ def skin(context) -> bpy.types.Object | None:
     if heads.is_skin(chosen) and chosen.name in context.scene.objects:
         return chosen
     return next(iter(heads.find_heads(context.scene)), None)
+
+
+def muscles_view(context, skin: bpy.types.Object) -> bpy.types.LayerCollection | None:
+    """The view layer's entry of the collection that holds a head's muscles, to show or hide them."""
+    collection = heads.head_collection(skin)
+    if collection is None:
+        return None
+    layer = context.view_layer.layer_collection.children.get(collection.name)
+    return layer.children.get(f"{collection.name} Muscles") if layer else None

@@ -107,24 +107,13 @@ def rest(skin) -> None:
 
 def follow(skin, depsgraph=None) -> None:
     """Bring the head to where its sliders say; does nothing while paused, switched off, or not a head."""
-    if (
-        _depth
-        or not heads.is_skin(skin)
-        or not skin.headshop.live
-        or skin.library
-        or not dependencies.available("scipy")
-    ):
+    if _depth or not heads.is_skin(skin) or not skin.headshop.live or skin.library or skin.mode != "OBJECT":
         return
-    values = sliders(skin, depsgraph)
-    with paused():
-        try:
-            following = _solve(skin, values, REST if bpy.app.background else LOOK)
-        except InputError as error:
-            print(f"Head Shop: {error}")
-            _following.pop(skin.session_uid, None)
-            return
-    waiting = following is not None and not following.settled and not bpy.app.background
-    if waiting:
+    if not dependencies.available("scipy"):
+        return
+    unhurried = bpy.app.background or bpy.app.is_job_running("RENDER")
+    following = _try(skin, sliders(skin, depsgraph), REST if unhurried else LOOK)
+    if following is not None and not following.settled:
         following.rounds = 0
         if not bpy.app.timers.is_registered(_settle):
             bpy.app.timers.register(_settle, first_interval=0.2)
@@ -135,18 +124,30 @@ def _settle():
     windows = bpy.context.window_manager.windows
     if jobs.running is not None or any(window.screen.is_animation_playing for window in windows):
         return 0.3
+    waiting = False
     for skin in heads.find_heads(bpy.context.scene):
         following = _following.get(skin.session_uid)
-        if following is None or following.settled or not skin.headshop.live:
+        if following is None or following.settled or not skin.headshop.live or skin.mode != "OBJECT":
             continue
-        before = following.state.skin
-        following.pose, following.rounds = None, following.rounds + 1
-        with paused():
-            _solve(skin, sliders(skin), ROUND)
-        still = np.abs(following.state.skin - before).max(initial=0.0) < VISIBLE
-        following.settled = following.settled or still or following.rounds >= ROUNDS
-    waiting = any(not following.settled for following in _following.values())
+        before, rounds = following.state.skin, following.rounds + 1
+        following.pose = None  # asks for more of the same
+        following = _try(skin, sliders(skin), ROUND)
+        if following is not None:
+            still = np.abs(following.state.skin - before).max(initial=0.0) < VISIBLE
+            following.rounds, following.settled = rounds, following.settled or still or rounds >= ROUNDS
+            waiting = waiting or not following.settled
     return 0.02 if waiting else None
+
+
+def _try(skin, values, iterations) -> _Following | None:
+    """`_solve`, or None with a line in the console where the head cannot be simulated."""
+    with paused():
+        try:
+            return _solve(skin, values, iterations)
+        except InputError as error:
+            print(f"Head Shop: {error}")
+            _following.pop(skin.session_uid, None)
+            return None
 
 
 def _solve(skin, values, iterations) -> _Following | None:
@@ -164,7 +165,7 @@ def _solve(skin, values, iterations) -> _Following | None:
         known = {*following.model.muscle_names, *muscle_names.CONTROLS}
         wanted = control(following.model, pose_from({name: v for name, v in values.items() if name in known}))
         solution = solve(following.model, wanted, following.state, max_iterations=iterations)
-        following.state, following.settled = solution.state, solution.converged or bpy.app.background
+        following.state, following.settled = solution.state, solution.converged or iterations == REST
         posed = posed_parts(following.model, solution.state, wanted)
     else:  # rest is the scan itself, exactly
         following.state, posed = rest_state(following.model), following.neutral

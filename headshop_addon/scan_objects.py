@@ -17,7 +17,7 @@ from ..sim.anatomy.landmark_names import SKIN
 from ..sim.errors import InputError
 from ..sim.progress import Work
 from ..sim.scan.orientation import Orientation
-from . import bridge, heads, pipeline, scan_landmarks
+from . import active, bridge, heads, pipeline, scan_landmarks
 
 TURN = "headshop_turn"
 
@@ -111,15 +111,6 @@ def look_at(context) -> None:
         bpy.ops.view3d.view_selected()
 
 
-def muscles_view(context, skin: bpy.types.Object) -> bpy.types.LayerCollection | None:
-    """The view layer's entry of the collection that holds a head's muscles, to show or hide them."""
-    collection = heads.head_collection(skin)
-    if collection is None:
-        return None
-    layer = context.view_layer.layer_collection.children.get(collection.name)
-    return layer.children.get(f"{collection.name} Muscles") if layer else None
-
-
 def summary(scan: bpy.types.Object) -> str:
     """A sentence about a scan that came in."""
     report = json.loads(scan.get(heads.REPORT, "{}")).get("scan", {})
@@ -169,8 +160,8 @@ def build(context, scan: bpy.types.Object, name: str = "") -> Work:
         prepared, placed, name or scan.name.removesuffix(" Scan"), scan, context.scene
     )
     skin.matrix_world = scan.matrix_world
-    scan.hide_set(True)
-    muscles = muscles_view(context, skin)
+    scan.hide_viewport = True
+    muscles = active.muscles_view(context, skin)
     if muscles is not None:
         muscles.hide_viewport = True  # they stay where they are when the face moves
     context.scene.headshop.head = skin

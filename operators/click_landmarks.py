@@ -52,7 +52,7 @@ class HEADSHOP_OT_click_landmarks(bpy.types.Operator):
             self.report({"INFO"}, "All landmarks are placed: choose one in the list to place it anew.")
             return {"CANCELLED"}
         context.scene.headshop.show_landmarks = True
-        self._scan.hide_set(False)  # it is hidden once a head was built from it
+        self._scan.hide_viewport = False  # it is hidden once a head was built from it
         context.window.cursor_modal_set("CROSSHAIR")
         context.window_manager.modal_handler_add(self)
         self._ask(context)

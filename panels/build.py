@@ -45,11 +45,24 @@ def _result(layout, context, skin):
             side = row.row()
             side.alignment = "RIGHT"
             side.label(text=f"{fit[key]:.2f} mm")
+    _show(layout, context, skin)
     column = layout.column(align=True)
     column.operator("headshop.dress_head", icon="MATERIAL")
     column.operator("headshop.repack_uv", icon="UV")
     if not dependencies.available("xatlas"):
         hint(layout, context, "Repacking UVs needs the library xatlas, which this Blender does not have.")
+
+
+def _show(layout, context, skin):
+    """What of the head is seen in the viewport."""
+    row = layout.row(align=True)
+    row.prop(skin, "hide_viewport", text="Skin", toggle=True, invert_checkbox=True)
+    muscles = active.muscles_view(context, skin)
+    if muscles is not None:
+        row.prop(muscles, "hide_viewport", text="Muscles", toggle=True, invert_checkbox=True)
+    scan = heads.scan_of(skin)
+    if scan is not None:
+        row.prop(scan, "hide_viewport", text="Scan", toggle=True, invert_checkbox=True)
 
 
 def classes():

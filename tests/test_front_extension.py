@@ -114,7 +114,7 @@ print("RESULT " + json.dumps({
     "scipy": [scipy.__version__, scipy.__file__],
     "repacked": repacked,
     "moved_mm": float(moved),
-    "left": [name for name in [*dir(bpy.types), *sys.modules] if name.startswith(("HEADSHOP", "bl_ext.user_default.h"))],
+    "left": [n for n in [*dir(bpy.types), *sys.modules] if n.startswith(("HEADSHOP", "bl_ext.user_default.h"))],
     "property": hasattr(bpy.types.Object, "headshop"),
 }))
 """

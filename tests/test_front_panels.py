@@ -63,6 +63,7 @@ def draw_all(bpy) -> dict[str, list[str]]:
         active_object=bpy.context.active_object,
         preferences=SimpleNamespace(system=SimpleNamespace(ui_scale=1.0)),
         region=SimpleNamespace(width=260),
+        view_layer=bpy.context.view_layer,
         mode=bpy.context.mode,
     )
     out = {}
@@ -113,7 +114,9 @@ def test_landmarks_are_counted_until_a_head_can_be_built(addon, scan, reference)
     scan_landmarks.replace(scan, {n: truth[n] for n in ("prn", "ex_r", "ex_l", "gn")})
     drawn = draw_all(addon)
     assert "4 placed, 56 estimated" in _text(drawn, "landmarks") and "Ready" in _text(drawn, "build")
-    assert "Place v" in _text(drawn, "landmark_list")
+    assert drawn["HEADSHOP_PT_landmark_list"] == ["landmarks"], "nothing is chosen yet"
+    scan.headshop.landmark_index = 0
+    assert "Place v" in _text(draw_all(addon), "landmark_list")
 
 
 def test_a_head_shows_every_slider_once_and_every_expression(addon, reference):
@@ -152,6 +155,29 @@ def test_without_xatlas_only_repacking_is_grey(addon, reference, monkeypatch):
         addon.ops.headshop.repack_uv()
     for name in ("build_head", "bake_expressions", "set_expression", "export_head"):
         assert getattr(addon.ops.headshop, name).poll() or name == "build_head"
+
+
+def test_the_preferences_name_the_libraries(addon, monkeypatch):
+    from headshop.headshop_addon import dependencies
+    from headshop.headshop_addon.preferences import HEADSHOP_AP_preferences, preferences
+
+    monkeypatch.setattr(dependencies, "available", lambda name: name != "xatlas")
+    assert preferences(addon.context).text_size == 11
+    seen: list[str] = []
+    settings = SimpleNamespace(layout=_Layout(addon, seen), bl_rna=HEADSHOP_AP_preferences.bl_rna)
+    HEADSHOP_AP_preferences.draw(settings, addon.context)
+    text = " ".join(seen)
+    assert "scipy 1." in text and "xatlas is missing" in text
+
+
+def test_what_is_inside_can_be_shown(addon, reference):
+    from headshop.headshop_addon import active, heads
+
+    heads.create_head(reference, "Ref")
+    skin = heads.find_heads()[0]
+    muscles = active.muscles_view(addon.context, skin)
+    assert muscles.collection.name == "Ref Muscles" and len(muscles.collection.objects) == len(reference.muscles)
+    assert draw_all(addon)["HEADSHOP_PT_build"].count("Muscles") == 1
 
 
 def test_a_running_job_is_shown(addon):
