@@ -1,11 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The reference head as shipped: connectivity, symmetry, landmarks, regions, measurements, and that it can be remade."""
+"""The reference head as shipped: connectivity, symmetry, landmarks, regions, measurements; it can be remade."""
 
 import os
 
 import numpy as np
 import pytest
-
 from headshop.assets.generators.eye_frame import RADIUS, eye_frames
 from headshop.assets.generators.make_reference_head import main
 from headshop.assets.generators.skin import make_skin
@@ -33,7 +32,7 @@ def directed_edges(faces):
 
 
 def piercings(vertices, triangles):
-    """Pairs (edge's triangle, triangle) that cut each other and share no vertex; by a grid of boxes, then Möller 1997."""
+    """Pairs (edge's triangle, triangle) that cut each other and share no vertex (grid of boxes, then Möller 1997)."""
     low, high = vertices[triangles].min(axis=1), vertices[triangles].max(axis=1)
     cell = 6.0
     first, last = np.floor(low / cell).astype(int), np.floor(high / cell).astype(int)

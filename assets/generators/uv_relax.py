@@ -7,7 +7,7 @@ from scipy.sparse.linalg import splu, spsolve
 
 
 def mean_value(vertices: np.ndarray, triangles: np.ndarray, fixed: np.ndarray, where: np.ndarray) -> np.ndarray:
-    """(n, 2) positions by mean value weights (Floater 2003), ``fixed`` vertices at ``where`` (k, 2) on a convex outline."""
+    """(n, 2) by mean value weights (Floater 2003); ``fixed`` vertices at ``where`` (k, 2), a convex outline."""
     rows, cols, values = [], [], []
     for k in range(3):
         i, j, m = triangles[:, k], triangles[:, (k + 1) % 3], triangles[:, (k + 2) % 3]
