@@ -20,6 +20,8 @@ _LID_WORK = {
     "orbicularis_oculi_palpebral": (0.22, 2.6),
     "orbicularis_oculi_lacrimal": (0.03, 0.1),
     "orbicularis_oculi_orbital": (0.12, 1.7),
+    "corrugator": (0.08, 0.2),  # the brow's skin sinks on the lid
+    "depressor_supercilii": (0.12, 0.2),
 }
 #: Jaw motion by fully contracted muscles of both sides: (open, forward); one side alone also moves the jaw sideways,
 #: away from it. Closers pull against opening.
