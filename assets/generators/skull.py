@@ -12,7 +12,7 @@ from .skull_field import carve, curve, ellipsoid, join, meet, plate, tube
 from .skull_nets import surface_nets
 
 #: Corners of the upper dental arch as seen from above: mm lateral of the midline, mm behind the incisors.
-ARCH = np.array([(0, 0), (8.5, 1.6), (16.5, 7.5), (21, 15), (24, 23), (26.5, 32), (28.5, 42), (29, 50)], float)
+ARCH = np.array([(0, 0), (8.5, 1.6), (16.5, 7.5), (21, 15), (24, 23), (26.5, 32), (28, 41), (28, 46)], float)
 
 #: From the outer corner of the eye to the side rim of the orbit, mm.
 RIM_SIDE = np.array([4.5, 11.0, 2.5])
@@ -44,18 +44,18 @@ def skull_field(space: BoneSpace):
     top = ridge + [0, 0, 8]
     rise = np.linspace(0, 1, 8)[:, None, None]
     alveolar = (ridge[None] + rise * (top - ridge)[None]).reshape(-1, 3)
-    ridges = plate(alveolar, np.full(len(alveolar), 4.8))
+    ridges = plate(alveolar, np.tile(np.interp(np.arange(60), [0, 40, 59], [4.8, 4.8, 3.4]), 8))
 
     malar = malar_centre(space)
     crest = np.array([alveolus[5, 0] + 2, alveolus[5, 1] - 2, roof[5] + 3.0])
     # Nose bones: a roof from the midline down to the frontal processes of the maxilla.
-    ridge_line = curve([at["n"] + [0, 3.0, 5.0], at["n"] + [0, 2.8, 0], rhi - 2.8 * space.normals["rhi"]], 20)
+    ridge_line = curve([at["n"] + [0, 4.6, 5.0], at["n"] + [0, 4.4, 0], rhi - 4.2 * space.normals["rhi"]], 20)
     nose_side = np.array([[8.0, n[1] + 7, n[2] + 1], [9.5, n[1] + 7, (n[2] + rhi[2]) / 2],
                           [13.2, (n[1] + ans[1]) / 2 + 6, rhi[2] - 9.0], [15.0, ans[1] + 4, ans[2] + 6]])  # fmt: skip
     eave = curve(nose_side[:3], 20)
     across = np.linspace(0, 1, 12)[:, None, None]
     shell = ridge_line + across * (eave - ridge_line) + np.array([0, -1.2, 0.6]) * 4 * across * (1 - across)
-    bridge = plate(shell.reshape(-1, 3), np.full(12 * 20, 2.8))
+    bridge = plate(shell.reshape(-1, 3), np.full(12 * 20, 4.2))
 
     rim = np.array([[11.0, n[1] + 6, eye[2]], rim_side, at["os_l"], at["or_l"]])
     rim_normal = np.linalg.svd(rim - rim.mean(axis=0))[2][-1]
@@ -117,11 +117,11 @@ def skull_field(space: BoneSpace):
         bone = carve(bone, orbit, 4.0)
         t = np.clip((rhi[2] + 4 - p[:, 2]) / (rhi[2] + 4 - ans[2]), 0, 1)
         wide = 4.0 + 8.5 * np.sin(t * np.pi * 0.62) ** 0.9
-        nose = np.maximum(p[:, 0] - wide, np.maximum(p[:, 2] - n[2] + 14, ans[2] + 1.5 - p[:, 2]))
+        nose = np.maximum(p[:, 0] - wide, np.maximum(p[:, 2] - rhi[2] - 3, ans[2] + 1.5 - p[:, 2]))
         nose = meet(nose, p[:, 1] - (ans[1] + 32), 4)
         bone = carve(bone, nose, 2.5)
-        bone = join(bone, bridge(p), 3)
-        side = tube(p, nose_side, [4.8, 5.0, 6.6, 5.6])
+        bone = join(bone, bridge(p), 4)
+        side = tube(p, nose_side, [5.0, 6.0, 6.6, 5.6])
         bone = join(bone, side, 4)
         bone = join(bone, tube(p, [[0, ans[1] + 11, ans[2] - 4], [0, ans[1] + 3.2, ans[2] - 1.5]], [4.5, 3.4]), 4)
         bone = carve(bone, ellipsoid(p, [0, po[1] + 22, base - 2], (14, 17, 12)), 5)

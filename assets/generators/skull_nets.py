@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """From a distance field to a closed mesh of quads: surface nets on a grid that is fine in the face and coarse behind.
 
-One vertex per grid cell that the surface crosses, one quad per crossed grid edge (Gibson 1998); afterwards the vertices
+One vertex per sheet of the surface in a grid cell, one quad per crossed grid edge (Gibson 1998); afterwards the vertices
 relax along the surface and are drawn back onto it. The field is symmetric in x and the grid has cells centred on
 x = 0, so the mesh is its own mirror image and has vertices on the midline.
 """
+
+from functools import cache
 
 import numpy as np
 from scipy.sparse import coo_matrix
@@ -34,8 +36,17 @@ def surface_nets(field, low, high, cell, fine=None, growth=12.0, rounds=6) -> Me
     half = shape[0] // 2
     value = field(grid[half:].reshape(-1, 3)).reshape(half, *shape[1:])
     value = np.concatenate([value[::-1], value])
-    value = _without_ambiguity(np.where(np.abs(value) < 1e-6, -1e-6, value))
-    faces, vertices = _quads(value, grid)
+    value = np.where(np.abs(value) < 1e-6, -1e-6, value)
+    for _ in range(12):
+        faces, vertices, cells = _quads(value, grid)
+        pinched = _pinched(faces)
+        if not len(pinched):
+            break
+        # Two sheets meet along an edge: fill their cells, on both sides alike.
+        for spot in np.unique(cells[pinched], axis=0):
+            for one in (spot, [shape[0] - 2 - spot[0], spot[1], spot[2]]):
+                corners = tuple((one + _CORNERS).T)
+                value[corners] = np.where(value[corners] < 0, value[corners], -0.3)
     return _relaxed(_largest(Mesh(vertices, faces)), field, cell, rounds)
 
 
@@ -58,71 +69,86 @@ def _axes(low, high, cell, fine, growth):
     return axes
 
 
-def _without_ambiguity(value):
-    """Fill cells where two sheets of the surface would share a vertex or an edge: the mesh is then a manifold."""
-    table = _ambiguous_cells()
-    for _ in range(20):
-        inside = value < 0
-        code = sum(inside[_corner(c, value.shape)].astype(int) << n for n, c in enumerate(_CORNERS))
-        bad = table[code]
-        if not bad.any():
-            return value
-        where = np.zeros(value.shape, bool)
-        for c in _CORNERS:
-            where[_corner(c, value.shape)] |= bad
-        value = np.where(where & ~inside, -0.2, value)
-    raise ArithmeticError("the bone's field is too ragged for this cell size")
+def _quads(value, grid):
+    """Faces (m, 4), first vertex positions (n, 3), the mean of the edge crossings of a sheet, and cells (n, 3).
+
+    A cell that several sheets cross has a vertex for each (dual marching cubes, Nielson 2004).
+    """
+    shape = np.array(value.shape) - 1
+    inside = value < 0
+    code = sum(inside[_corner(c, value.shape)].astype(int) << n for n, c in enumerate(_CORNERS))
+    sheet_of = _sheets()
+    loops, crossings = [], []
+    for axis in range(3):
+        first = tuple(slice(0, -1) if a == axis else slice(None) for a in range(3))
+        second = tuple(slice(1, None) if a == axis else slice(None) for a in range(3))
+        at = np.argwhere(inside[first] != inside[second])
+        step, u, v = (np.eye(3, dtype=int)[(axis + k) % 3] for k in range(3))
+        va, vb = value[tuple(at.T)], value[tuple((at + step).T)]
+        pa, pb = grid[tuple(at.T)], grid[tuple((at + step).T)]
+        ring = []
+        for a, b in ((1, 1), (0, 1), (0, 0), (1, 0)):  # the four cells round the edge
+            cell = at - a * u - b * v
+            sheet = sheet_of[code[tuple(cell.T)], axis * 4 + a * 2 + b]
+            ring.append(np.ravel_multi_index(tuple(cell.T), shape) * 4 + sheet)
+        index = np.stack(ring, axis=1)
+        index[va > vb] = index[va > vb][:, ::-1]
+        loops.append(index)
+        crossings.append(pa + (va / (va - vb))[:, None] * (pb - pa))
+    faces = np.concatenate(loops)
+    used, faces = np.unique(faces, return_inverse=True)
+    faces = faces.reshape(-1, 4)
+    point = np.repeat(np.concatenate(crossings), 4, axis=0)
+    count = np.bincount(faces.ravel(), minlength=len(used))
+    total = np.stack([np.bincount(faces.ravel(), p, minlength=len(used)) for p in point.T], axis=1)
+    cells = np.stack(np.unravel_index(used // 4, shape), axis=1)
+    return faces.astype(np.int32), total / count[:, None], cells
+
+
+def _pinched(faces):
+    """Vertices of edges that more than two faces share."""
+    pairs = np.sort(np.concatenate([faces[:, [k, (k + 1) % 4]] for k in range(4)]), axis=1)
+    pairs, count = np.unique(pairs, axis=0, return_counts=True)
+    return np.unique(pairs[count > 2])
 
 
 def _corner(c, shape):
     return tuple(slice(c[a], shape[a] - 1 + c[a]) for a in range(3))
 
 
-def _ambiguous_cells():
-    """(256,) bool: corner patterns whose inside or outside falls apart, or with a checkerboard face."""
-    near = np.abs(_CORNERS[:, None] - _CORNERS[None]).sum(-1) == 1
-    bad = np.zeros(256, bool)
-    for code in range(256):
-        inside = (code >> np.arange(8) & 1).astype(bool)
-        for side in (inside, ~inside):
-            if side.any() and connected_components(coo_matrix(near[np.ix_(side, side)]))[0] > 1:
-                bad[code] = True
-        for axis in range(3):
-            for level in (0, 1):
-                on = _CORNERS[:, axis] == level
-                a, b, c, d = inside[on]  # order 00 01 10 11
-                bad[code] |= a == d and b == c and a != b
-    return bad
+@cache
+def _sheets():
+    """(256, 12) for each pattern of corners inside: the number of the sheet that crosses each edge of the cell.
 
-
-def _quads(value, grid):
-    """Faces (m, 4), and the mean edge crossing of each cell as first vertex positions (n, 3)."""
-    shape = np.array(value.shape) - 1
-    total = np.zeros((*shape, 3))
-    count = np.zeros(shape)
-    loops = []
+    Edge ``axis * 4 + a * 2 + b`` runs along ``axis`` at offsets a, b in the two axes that follow it. On a face with
+    four crossings the inside corners are kept apart, as its other cell will do.
+    """
+    ends = []
     for axis in range(3):
-        first = [slice(None)] * 3
-        second = [slice(None)] * 3
-        first[axis], second[axis] = slice(0, -1), slice(1, None)
-        a, b = value[tuple(first)], value[tuple(second)]
-        at = np.argwhere((a < 0) != (b < 0))
-        va, vb = a[tuple(at.T)], b[tuple(at.T)]
-        step = np.eye(3, dtype=int)[axis]
-        pa, pb = grid[tuple(at.T)], grid[tuple((at + step).T)]
-        cross = pa + (va / (va - vb))[:, None] * (pb - pa)
-        u, v = np.eye(3, dtype=int)[(axis + 1) % 3], np.eye(3, dtype=int)[(axis + 2) % 3]
-        ring = [at - u - v, at - v, at, at - u]
-        for cell in ring:
-            np.add.at(total, tuple(cell.T), cross)
-            np.add.at(count, tuple(cell.T), 1)
-        index = np.stack([np.ravel_multi_index(tuple(c.T), shape) for c in ring], axis=1)
-        index[va > vb] = index[va > vb][:, ::-1]
-        loops.append(index)
-    faces = np.concatenate(loops)
-    used, faces = np.unique(faces, return_inverse=True)
-    vertices = total.reshape(-1, 3)[used] / count.reshape(-1, 1)[used]
-    return faces.reshape(-1, 4).astype(np.int32), vertices
+        for a, b in ((0, 0), (0, 1), (1, 0), (1, 1)):
+            low = np.zeros(3, int)
+            low[(axis + 1) % 3], low[(axis + 2) % 3] = a, b
+            ends.append(
+                [int(np.flatnonzero((low + k * np.eye(3, dtype=int)[axis] == _CORNERS).all(1))[0]) for k in (0, 1)]
+            )
+    ends = np.array(ends)
+    faces = [np.flatnonzero(_CORNERS[:, axis] == level) for axis in range(3) for level in (0, 1)]
+    out = np.zeros((256, 12), int)
+    for pattern in range(256):
+        inside = (pattern >> np.arange(8) & 1).astype(bool)
+        crossed = inside[ends[:, 0]] != inside[ends[:, 1]]
+        link = np.zeros((12, 12), bool)
+        for face in faces:
+            on = np.flatnonzero(crossed & np.isin(ends, face).all(axis=1))
+            if len(on) == 2:
+                link[on[0], on[1]] = True
+            for corner in face[inside[face]] if len(on) == 4 else ():
+                first, second = on[(ends[on] == corner).any(axis=1)]
+                link[first, second] = True
+        label = connected_components(coo_matrix(link), directed=False)[1]
+        names = np.unique(label[crossed])
+        out[pattern, crossed] = np.searchsorted(names, label[crossed])
+    return out
 
 
 def _largest(mesh):
