@@ -7,7 +7,9 @@ stderr and no file left behind.
 
 import argparse
 import os
+import signal
 import sys
+from contextlib import contextmanager
 
 from ..sim.errors import InputError
 
@@ -88,7 +90,8 @@ def main(argv: list[str] | None = None) -> int:
         elif options.command is None:
             program.print_help()
         else:
-            getattr(commands, options.command)(options)
+            with _terminable():
+                getattr(commands, options.command)(options)
         return 0
     except KeyboardInterrupt:
         return _say("Interrupted: nothing was written.", INTERRUPTED)
@@ -104,6 +107,24 @@ def main(argv: list[str] | None = None) -> int:
     except Exception as error:  # a user gets a sentence, whatever happens
         what = f"{type(error).__name__}: {_one_line(error)}"
         return _say(f"Something went wrong that should not have ({what}): --debug shows where.", 1, debug)
+
+
+@contextmanager
+def _terminable():
+    """Being told to end (SIGTERM, as by ``timeout`` or a shutdown) cleans up as Ctrl-C does."""
+
+    def interrupt(*_):
+        raise KeyboardInterrupt
+
+    try:
+        before = signal.signal(signal.SIGTERM, interrupt)
+    except ValueError:  # not the main thread: no signals arrive here
+        yield
+        return
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before if before is not None else signal.SIG_DFL)
 
 
 def _one_line(error) -> str:

@@ -96,6 +96,7 @@ def render(options) -> None:
     with Outputs() as outputs:
         picture = outputs.file(options.output)
         skin = _open(options)
+        _wake_cycles()
         if kind == ".png":
             from .contact_sheet import render_sheet as render_it
         else:
@@ -205,6 +206,17 @@ def _save(path: Path) -> None:
 def _run(work, options):
     with progress_bar(not options.quiet) as show:
         return finish(work, show)
+
+
+def _wake_cycles() -> None:
+    """Let the renderer look for graphics cards now, while what it says about them is held back."""
+    import bpy
+
+    from .quiet import quiet
+
+    settings = getattr(bpy.context.scene, "cycles", None)
+    with quiet():
+        getattr(settings, "denoiser", None)
 
 
 def _set_stage(skin) -> None:

@@ -24,17 +24,20 @@ def quiet():
 
 @contextmanager
 def _patient():
-    """Ctrl-C takes effect at the end instead of in the middle."""
-    struck = []
+    """Ctrl-C and the like take effect at the end instead of in the middle."""
+    struck, before = [], {}
     try:
-        before = signal.signal(signal.SIGINT, lambda *_: struck.append(True))
+        for number in (signal.SIGINT, signal.SIGTERM):
+            if callable(signal.getsignal(number)):  # a handler of Python's; Blender's own are left alone
+                before[number] = signal.signal(number, lambda *_: struck.append(True))
     except ValueError:  # not the main thread: no signals arrive here
         yield
         return
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before if before is not None else signal.SIG_DFL)
+        for number, handler in before.items():
+            signal.signal(number, handler)
         if struck:
             raise KeyboardInterrupt
 

@@ -177,7 +177,8 @@ def test_nothing_to_bake(capfd, tmp_path):
     assert "--set" in fails(capfd, tmp_path, "bake", head)
 
 
-def test_ctrl_c_in_the_middle(blender, tmp_path, scan, landmarks):
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_ctrl_c_in_the_middle(blender, tmp_path, scan, landmarks, number):
     given = landmarks()
     before = sorted(tmp_path.rglob("*"))
     command = [sys.executable, "-m", "headshop", *map(str, build(scan, given, tmp_path))]
@@ -185,7 +186,7 @@ def test_ctrl_c_in_the_middle(blender, tmp_path, scan, landmarks):
     while process.poll() is None and sorted(tmp_path.rglob("*")) == before:
         time.sleep(0.02)  # until it has begun: its scratch folder is there
     time.sleep(0.3)
-    process.send_signal(signal.SIGINT)
+    process.send_signal(number)
     out, err = process.communicate(timeout=60)
     assert process.returncode == 130, (out, err)
     assert err == "headshop: Interrupted: nothing was written.\n"
