@@ -109,5 +109,8 @@ def _cornea(graph: Graph) -> None:
     # a tear film mirrors a little more than the bare surface; the back of a face mirrors nothing
     geometry = graph.node("NewGeometry")
     front = graph.math("SUBTRACT", 1.0, socket(geometry.outputs, "Backfacing"))
-    amount = graph.math("MULTIPLY", graph.math("MULTIPLY", facing, 1.5, clamp=True), front)
+    # at its rim it passes into the white and has no edge of its own
+    radius, _, _ = _polar(graph)
+    inside = graph.math("MULTIPLY", front, graph.smooth(radius, 0.90, 0.99, 1.0, 0.0))
+    amount = graph.math("MULTIPLY", graph.math("MULTIPLY", facing, 1.5, clamp=True), inside)
     graph.surface(graph.node("MixShader", {0: amount, 1: clear, 2: mirror}).outputs[0])

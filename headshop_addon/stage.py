@@ -23,8 +23,8 @@ LENS_MM = 100.0
 #: role -> (degrees to the image's right, degrees up, distance, (width, height), watts, colour). Lengths are in head
 #: heights; watts are for a head of `USUAL_HEIGHT` and grow with its square.
 LIGHTS = {
-    "Key": (-40, 26, 4.6, (1.7, 1.7), 18.5, (1.0, 0.955, 0.90)),
-    "Fill": (46, 4, 5.2, (4.4, 4.4), 4.2, (0.86, 0.93, 1.0)),
+    "Key": (-32, 28, 4.6, (2.2, 2.2), 18.0, (1.0, 0.955, 0.90)),
+    "Fill": (48, 2, 5.2, (4.4, 4.4), 5.0, (0.86, 0.93, 1.0)),
     "Rim": (160, 12, 4.0, (1.0, 3.2), 11.0, (0.90, 0.95, 1.0)),
     "Kicker": (-158, 8, 4.4, (0.9, 3.2), 8.0, (1.0, 0.96, 0.9)),
 }

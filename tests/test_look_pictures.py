@@ -19,6 +19,7 @@ def skin(bpy, reference):
     heads.create_head(reference, "Ada")
     (skin,) = heads.find_heads()
     materials.dress_head(skin)
+    skin.modifiers.clear()  # no need for a smooth surface at this size
     rest = bridge.read_positions(skin)
     chin = reference.landmark_positions()["pg"]
     near = np.exp(-((rest - chin) ** 2).sum(axis=1) / 40.0**2)[:, None]
