@@ -87,12 +87,13 @@ def baked_report(obj: bpy.types.Object) -> dict[str, dict]:
 
 
 def _refuse_foreign(skin, names) -> None:
-    keys = skin.data.shape_keys
-    foreign = [n for n in names if keys and n in keys.key_blocks and n not in baked_report(skin)]
-    if foreign:
-        raise InputError(
-            f"{skin.name!r} has a shape key {foreign[0]!r} of your own, which a bake would replace: rename it first."
-        )
+    for obj in heads.parts_of(skin).values():
+        keys, ours = obj.data.shape_keys, baked_report(obj)
+        foreign = [name for name in names if keys and name in keys.key_blocks and name not in ours]
+        if foreign:
+            raise InputError(
+                f"{obj.name!r} has a shape key {foreign[0]!r} of your own, which a bake would replace: rename it first."
+            )
 
 
 def write_shapes(skin: bpy.types.Object, shapes: dict[str, dict[str, np.ndarray]], report: dict[str, dict]) -> None:

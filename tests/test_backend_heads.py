@@ -74,6 +74,16 @@ def test_two_heads_stand_apart(heads, skin, reference):
     assert not set(heads.parts_of(skin).values()) & set(heads.parts_of(heads.find_heads()[1]).values())
 
 
+def test_the_one_head_of_a_file(bpy, heads, skin, reference):
+    assert heads.only_head() == skin
+    heads.create_head(reference, "Fran")
+    assert heads.only_head(name="Fran.001") == heads.find_heads()[1]
+    for name, words in ((None, "several heads"), ("Joe", "no head 'Joe'")):
+        with pytest.raises(InputError, match=words):
+            heads.only_head(name=name)
+    assert heads.skin_of(heads.parts_of(skin)["tongue"]) == skin and heads.skin_of(None) is None
+
+
 def test_saving_and_loading(bpy, heads, skin, reference, tmp_path):
     heads.write_report(skin, {"fit": {"mean_mm": 0.1}})
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "head.blend"), copy=True)

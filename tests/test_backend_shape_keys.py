@@ -62,11 +62,12 @@ def test_baking_again_replaces_only_ours(skin, shape_keys, reference):
     assert names(skin) == ["Basis", "sculpted"] and names(heads.parts_of(skin)["mandible"]) == []
 
 
-def test_a_key_of_the_artists_own_is_not_replaced(skin, shape_keys):
-    from headshop.headshop_addon import bridge
+@pytest.mark.parametrize("part", ["skin", "tongue"])
+def test_a_key_of_the_artists_own_is_not_replaced(skin, shape_keys, part):
+    from headshop.headshop_addon import bridge, heads
     from headshop.sim.acting.pose import Pose
 
-    bridge.ensure_shape_key(skin, "joy")
+    bridge.ensure_shape_key(heads.parts_of(skin)[part], "joy")
     with pytest.raises(InputError, match="'joy' of your own"):
         finish(shape_keys.bake_poses(skin, {"joy": Pose()}))
 

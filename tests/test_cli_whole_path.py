@@ -123,3 +123,24 @@ def test_the_file_opens_on_the_head(bpy, built):
     areas = [area for screen in bpy.data.screens for area in screen.areas if area.type == "VIEW_3D"]
     assert areas and all(area.spaces.active.region_3d.view_distance < 1.5 for area in areas)
     assert bpy.context.scene.camera is not None
+
+
+@pytest.mark.parametrize(
+    ("module", "function", "name"), [("contact_sheet", "render_sheet", "a.png"), ("movie", "render_movie", "a.mp4")]
+)
+def test_render_writes_what_the_name_says(built, monkeypatch, capfd, module, function, name):
+    """Which renderer is called with what; the renderers have tests of their own."""
+    from importlib import import_module
+
+    from headshop.sim.progress import Progress
+
+    def renderer(skin, path):
+        yield Progress(0.5, "Rendering")
+        assert skin.name == "scan Skin" and not (built / name).exists()
+        path.write_bytes(b"a picture")
+
+    monkeypatch.setattr(import_module(f"headshop.headshop_addon.{module}"), function, renderer)
+    capfd.readouterr()
+    run("render", built / "head.blend", "-o", built / name)
+    assert (built / name).read_bytes() == b"a picture"
+    assert capfd.readouterr() == (f"{built / name}\n", "")
