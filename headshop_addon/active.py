@@ -23,10 +23,9 @@ def skin(context) -> bpy.types.Object | None:
     return next(iter(heads.find_heads(context.scene)), None)
 
 
-def muscles_view(context, skin: bpy.types.Object) -> bpy.types.LayerCollection | None:
-    """The view layer's entry of the collection that holds a head's muscles, to show or hide them."""
+def muscles_collection(skin: bpy.types.Object) -> bpy.types.Collection | None:
+    """The collection that holds a head's muscles, to show or hide them; None where the artist dissolved it."""
     collection = heads.head_collection(skin)
-    if collection is None:
-        return None
-    layer = context.view_layer.layer_collection.children.get(collection.name)
-    return layer.children.get(f"{collection.name} Muscles") if layer else None
+    muscles = set(heads.muscles_of(skin).values())
+    children = collection.children if collection else ()
+    return next((child for child in children if muscles & set(child.objects)), None)

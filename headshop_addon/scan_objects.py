@@ -161,7 +161,7 @@ def build(context, scan: bpy.types.Object, name: str = "") -> Work:
     )
     skin.matrix_world = scan.matrix_world
     scan.hide_viewport = True
-    muscles = active.muscles_view(context, skin)
+    muscles = active.muscles_collection(skin)
     if muscles is not None:
         muscles.hide_viewport = True  # they stay where they are when the face moves
     context.scene.headshop.head = skin

@@ -45,7 +45,7 @@ def _result(layout, context, skin):
             side = row.row()
             side.alignment = "RIGHT"
             side.label(text=f"{fit[key]:.2f} mm")
-    _show(layout, context, skin)
+    _show(layout, skin)
     column = layout.column(align=True)
     column.operator("headshop.dress_head", icon="MATERIAL")
     column.operator("headshop.repack_uv", icon="UV")
@@ -53,11 +53,11 @@ def _result(layout, context, skin):
         hint(layout, context, "Repacking UVs needs the library xatlas, which this Blender does not have.")
 
 
-def _show(layout, context, skin):
+def _show(layout, skin):
     """What of the head is seen in the viewport."""
     row = layout.row(align=True)
     row.prop(skin, "hide_viewport", text="Skin", toggle=True, invert_checkbox=True)
-    muscles = active.muscles_view(context, skin)
+    muscles = active.muscles_collection(skin)
     if muscles is not None:
         row.prop(muscles, "hide_viewport", text="Muscles", toggle=True, invert_checkbox=True)
     scan = heads.scan_of(skin)

@@ -175,8 +175,8 @@ def test_what_is_inside_can_be_shown(addon, reference):
 
     heads.create_head(reference, "Ref")
     skin = heads.find_heads()[0]
-    muscles = active.muscles_view(addon.context, skin)
-    assert muscles.collection.name == "Ref Muscles" and len(muscles.collection.objects) == len(reference.muscles)
+    muscles = active.muscles_collection(skin)
+    assert muscles.name == "Ref Muscles" and len(muscles.objects) == len(reference.muscles)
     assert draw_all(addon)["HEADSHOP_PT_build"].count("Muscles") == 1
 
 
