@@ -15,6 +15,7 @@ import json
 import time
 
 import numpy as np
+
 from headshop.sim.adapt.build import NORMALS, build_head
 from headshop.sim.adapt.closest import Surface
 from headshop.sim.adapt.skin_fit import fit_skin

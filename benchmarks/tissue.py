@@ -14,6 +14,7 @@ import json
 import time
 
 import numpy as np
+
 from headshop.sim.acting.expressions import expressions
 from headshop.sim.acting.pose import control
 from headshop.sim.anatomy.storage import load_head

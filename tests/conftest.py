@@ -83,6 +83,7 @@ def reference():
 def bad_scan(tmp_path):
     """``bad_scan(kind)`` -> path of a file: empty, text, missing, truncated, points, nan, one_triangle, whole."""
     import numpy as np
+
     from headshop.sim.mesh import Mesh
     from headshop.sim.scan.ply import write_ply
 

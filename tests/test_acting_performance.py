@@ -3,6 +3,7 @@ import json
 
 import numpy as np
 import pytest
+
 from headshop.sim.acting.performance import (
     FORMAT,
     Performance,

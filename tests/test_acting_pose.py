@@ -3,6 +3,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+
 from headshop.sim.acting.expressions import BASIC, expressions, for_head, muscle_poses
 from headshop.sim.acting.pose import CONTROLS, GAZE_REACH, Pose, control, pose_from
 from headshop.sim.errors import InputError

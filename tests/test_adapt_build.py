@@ -3,6 +3,8 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
+
 from headshop.sim.adapt.build import build_head, fit_report
 from headshop.sim.adapt.carry import carry
 from headshop.sim.adapt.closest import Surface
@@ -19,7 +21,6 @@ from headshop.sim.mesh_subdivision import subdivision
 from headshop.sim.progress import Progress, finish
 from headshop.sim.scan.clean import clean_scan
 from headshop.sim.scan.ply import read_ply
-from scipy.spatial.transform import Rotation
 
 
 def bent(points):

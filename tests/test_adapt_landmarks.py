@@ -5,6 +5,7 @@ import json
 
 import numpy as np
 import pytest
+
 from headshop.sim.adapt.gate import check_against_scan, check_arrangement
 from headshop.sim.adapt.landmarks import read_landmarks, write_landmarks
 from headshop.sim.anatomy.landmark_names import SKIN, mirrored

@@ -3,13 +3,14 @@
 
 import numpy as np
 import pytest
+from scipy.interpolate import RBFInterpolator
+from scipy.spatial.transform import Rotation
+
 from headshop.sim.adapt import thin_plate_spline
 from headshop.sim.adapt.completion import complete_landmarks, complete_positions
 from headshop.sim.adapt.landmarks import read_landmarks
 from headshop.sim.adapt.thin_plate_spline import System, ThinPlateSpline, WarpChain, flatness, similarity
 from headshop.sim.errors import InputError
-from scipy.interpolate import RBFInterpolator
-from scipy.spatial.transform import Rotation
 
 
 @pytest.fixture

@@ -3,6 +3,7 @@
 
 import numpy as np
 import pytest
+
 from headshop.sim.anatomy.inside import inside, winding_number
 from headshop.sim.anatomy.landmark_names import SKULL, mirrored
 from headshop.sim.anatomy.storage import load_head

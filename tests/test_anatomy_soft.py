@@ -5,12 +5,13 @@ import csv
 
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
+
 from headshop.sim.anatomy.head import MATERIALS
 from headshop.sim.anatomy.inside import inside, winding_number
 from headshop.sim.anatomy.muscle_shape import Room, muscle_shape, reshaped
 from headshop.sim.anatomy.storage import load_head
 from headshop.sim.anatomy.tissue_depth import TABLE
-from scipy.spatial import cKDTree
 
 
 @pytest.fixture(scope="module")

@@ -5,6 +5,7 @@ import os
 
 import numpy as np
 import pytest
+
 from headshop.assets.generators.eye_frame import RADIUS, eye_frames
 from headshop.assets.generators.make_reference_head import main
 from headshop.assets.generators.skin import make_skin

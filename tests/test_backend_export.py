@@ -5,6 +5,7 @@ import json
 
 import numpy as np
 import pytest
+
 from headshop.sim.adapt.landmarks import read_landmarks
 from headshop.sim.scan.ply import read_ply
 

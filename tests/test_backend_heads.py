@@ -3,6 +3,7 @@
 
 import numpy as np
 import pytest
+
 from headshop.sim.anatomy.head import PARTS
 from headshop.sim.anatomy.storage import anatomy_document
 from headshop.sim.errors import InputError

@@ -3,6 +3,7 @@
 
 import numpy as np
 import pytest
+
 from headshop.headshop_addon.outputs import Outputs
 from headshop.sim.acting.principal import principal_shapes
 from headshop.sim.errors import InputError

@@ -6,6 +6,7 @@ import sys
 
 import numpy as np
 import pytest
+
 from headshop.sim.acting.principal import principal_shapes
 from headshop.sim.progress import finish
 

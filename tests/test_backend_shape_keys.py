@@ -3,6 +3,7 @@
 
 import numpy as np
 import pytest
+
 from headshop.sim.errors import InputError
 from headshop.sim.progress import finish
 

@@ -9,6 +9,7 @@ import sys
 import time
 
 import pytest
+
 from headshop.headshop_addon.command_line import main
 from headshop.sim.anatomy.head import Head
 from headshop.sim.mesh import Mesh

@@ -8,6 +8,7 @@ import signal
 import sys
 
 import pytest
+
 from headshop.headshop_addon.command_line import main
 from headshop.headshop_addon.progress_bar import progress_bar
 from headshop.headshop_addon.quiet import quiet

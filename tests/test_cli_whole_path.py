@@ -7,6 +7,7 @@ import sys
 
 import numpy as np
 import pytest
+
 from headshop.headshop_addon.command_line import main
 from headshop.sim.acting import expressions
 from headshop.sim.adapt.landmarks import write_landmarks

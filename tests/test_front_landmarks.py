@@ -5,6 +5,7 @@ import json
 
 import numpy as np
 import pytest
+
 from headshop.sim.anatomy.landmark_names import SKIN
 
 

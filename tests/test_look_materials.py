@@ -3,6 +3,7 @@
 
 import numpy as np
 import pytest
+
 from headshop.sim.anatomy.head import MATERIALS
 
 
@@ -137,8 +138,9 @@ def test_a_coloured_scan_gives_the_head_a_skin_of_its_own(bpy, reference, monkey
 
 
 def test_the_portrait_turns_with_the_head(bpy, skin, reference):
-    from headshop.headshop_addon.stage import portrait, set_stage
     from mathutils import Matrix
+
+    from headshop.headshop_addon.stage import portrait, set_stage
 
     upright = portrait(skin)
     np.testing.assert_allclose(upright.left, (1, 0, 0), atol=0.02)

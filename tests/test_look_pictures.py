@@ -5,6 +5,7 @@ import tempfile
 
 import numpy as np
 import pytest
+
 from headshop.sim.errors import InputError
 from headshop.sim.progress import finish
 

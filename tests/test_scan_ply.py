@@ -3,6 +3,7 @@
 
 import numpy as np
 import pytest
+
 from headshop.sim.errors import InputError
 from headshop.sim.mesh import Mesh
 from headshop.sim.scan.ply import FORMATS, read_ply, write_ply

@@ -5,6 +5,8 @@ import json
 
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
+
 from headshop.sim.adapt.closest import Surface
 from headshop.sim.adapt.landmarks import read_landmarks
 from headshop.sim.errors import InputError
@@ -14,7 +16,6 @@ from headshop.sim.scan.individual import draw_field, individual
 from headshop.sim.scan.ply import read_ply
 from headshop.sim.scan.sample import make_sample, write_sample
 from headshop.sim.scan.scanner import VirtualScanner
-from scipy.spatial import cKDTree
 
 
 @pytest.fixture(scope="module")

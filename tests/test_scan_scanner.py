@@ -3,11 +3,12 @@
 
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
+
 from headshop.sim.mesh import Mesh
 from headshop.sim.progress import finish
 from headshop.sim.scan.clean import clean_scan, components
 from headshop.sim.scan.scanner import VirtualScanner
-from scipy.spatial import cKDTree
 
 QUIET = VirtualScanner(
     target=(0, 0, 0), field=(220, 220), pixel=2.0, noise=0, ripple=0, quantum=1e-6, registration=0, specks=0

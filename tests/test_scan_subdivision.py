@@ -2,6 +2,7 @@
 """Catmull-Clark: planes stay planes, known masks hold, a subdivided cube's limit is reached."""
 
 import numpy as np
+
 from headshop.sim.mesh_subdivision import limit, subdivision
 
 CUBE = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)

@@ -2,6 +2,7 @@
 """Depth maps agree with geometry that can be worked out by hand."""
 
 import numpy as np
+
 from headshop.sim.scan.viewpoint import Viewpoint, depth_map
 
 

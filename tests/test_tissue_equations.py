@@ -3,6 +3,7 @@
 
 import numpy as np
 import pytest
+
 from headshop.sim.anatomy.head import Eye, Jaw
 from headshop.sim.tissue.geometry import Surface, closest_on_triangles
 from headshop.sim.tissue.jaw import jaw_transform, opening_mm

@@ -3,6 +3,7 @@
 
 import numpy as np
 import pytest
+
 from headshop.sim.acting.expressions import BASIC, expressions, for_head
 from headshop.sim.acting.pose import Pose, control
 from headshop.sim.tissue.lids import eyeball_radius

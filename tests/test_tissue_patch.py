@@ -3,6 +3,7 @@
 
 import numpy as np
 import pytest
+
 from headshop.sim.acting.pose import Pose, control
 from headshop.sim.anatomy.head import PARTS, SKIN_GROUPS, Eye, Head, Jaw, Muscle, SurfacePoints
 from headshop.sim.mesh import Mesh
