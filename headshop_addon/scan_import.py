@@ -18,7 +18,7 @@ from ..sim.scan.ply import read_ply
 from . import bridge
 from .quiet import quiet
 
-# Files of no stated axes (OBJ, STL) come in unturned: landmarks are given in the file's own axes.
+# Landmarks are given in the file's own axes, so OBJ and STL come in unturned, and glTF is turned back (`_FILE_AXES`).
 _RAW_AXES = {"forward_axis": "Y", "up_axis": "Z"}
 
 
@@ -53,6 +53,8 @@ _IMPORTERS = {
     **dict.fromkeys((".usd", ".usda", ".usdc", ".usdz"), _import_usd),
     ".fbx": _import_fbx,
 }
+#: Blender's axes back to the file's, where they are known to differ: glTF is Y up.
+_FILE_AXES = dict.fromkeys((".glb", ".gltf"), np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]]))
 EXTENSIONS = (".ply", *_IMPORTERS)
 
 
@@ -77,7 +79,7 @@ def check_file(path) -> Path:
 
 
 def read_scan(path) -> Mesh:
-    """All meshes of a scan file as one, in the file's own units and axes (glTF, USD and FBX: in metres, Z up).
+    """All meshes of a scan file as one, in the file's own units and axes (USD and FBX: in metres, Z up).
 
     Raises
     ------
@@ -100,7 +102,8 @@ def read_scan(path) -> Mesh:
         meshes = _meshes_of(scene)
     if not meshes:
         raise InputError(f"{path} holds no mesh that can be read as {extension[1:].upper()}: export the scan again.")
-    return joined(meshes)
+    scan = joined(meshes)
+    return scan.moved(scan.vertices @ _FILE_AXES[extension].T) if extension in _FILE_AXES else scan
 
 
 def _check_length(path: Path, extension: str) -> None:
