@@ -12,11 +12,11 @@ from ..anatomy.tissue_depth import tissue_vectors
 from ..progress import Progress, Work
 from . import bone, eyeballs
 from .closest import Surface
-from .openings import lips_apart, rims, sealed_lids
+from .openings import lids_apart, lips_apart, rims, sealed_lids
 from .refine import scattered, thinned
 from .skin_fit import SkinFit, group
 from .thin_plate_spline import System, ThinPlateSpline, similarity
-from .untangle import untangled
+from .untangle import restored, untangled
 
 BONES = ("skull", "mandible")
 TEETH = ("teeth_upper", "teeth_lower")
@@ -71,7 +71,9 @@ def carry(reference: Head, fit: SkinFit) -> Work:
     final = lips_apart(reference, final, inner, size)
     for k, side in enumerate(("l", "r")):
         if side in fit.closed:
-            final = sealed_lids(reference, rims(reference), final, eyes[k], side)
+            rim = rims(reference)
+            final = lids_apart(reference, rim, final, reference.landmarks.on({"skin": fitted}), size[:, 2], side)
+            final = sealed_lids(reference, rim, final, eyes[k], side)
         final = lids_on_eye(reference, final, parts[f"eye_{side}"], eyes[k], k, side, inner)
 
     yield Progress(0.45, "Untangle the skin")
@@ -79,7 +81,8 @@ def carry(reference: Head, fit: SkinFit) -> Work:
     for side in fit.closed:  # closed lids lie too close for the reference's open ones to be restored
         for lid in ("lid_upper", "lid_lower"):
             shut |= group(reference, f"{lid}_{side}") > 0.2
-    final = untangled(skin.vertices, final, skin.faces, triangles, ~inner, shut)
+    final = restored(skin.vertices, final, skin.faces, fit.unseen)
+    final = untangled(skin.vertices, final, skin.faces, triangles, ~(inner | fit.unseen), shut)
 
     yield Progress(0.5, "Bone under the skin")
     surface = Surface(final, triangles)

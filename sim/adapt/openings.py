@@ -105,6 +105,25 @@ def lid_pairs(reference: Head, rim, side: str):
     return upper, np.stack([lower[after - 1], lower[after]], axis=1), share
 
 
+def lids_apart(reference: Head, rim, skin, marks, up, side: str) -> np.ndarray:
+    """Skin vertices (n, 3) with the margins of closed lids parted where they passed each other.
+
+    marks : the fitted landmarks (name -> mm), for the way from the inner to the outer corner; up (3,)
+    """
+    out = np.array(skin)
+    frame = _eye_frame(marks[f"en_{side}"], marks[f"ex_{side}"], up)
+    upper, lower = (_rim_of(reference, rim, f"lid_{x}_{side}") for x in ("upper", "lower"))
+    for _ in range(6):
+        for rows, others, sign in ((upper, lower, 1.0), (lower, upper, -1.0)):
+            here, there = out[rows] @ frame.T, out[others] @ frame.T
+            order = np.argsort(there[:, 0], kind="stable")
+            level = np.interp(here[:, 0], there[order, 0], there[order, 1])
+            inside = (here[:, 0] > there[:, 0].min()) & (here[:, 0] < there[:, 0].max())
+            lack = np.where(inside, np.maximum(CREASE - sign * (here[:, 1] - level), 0), 0)
+            out[rows] += sign * lack[:, None] * frame[1]
+    return out
+
+
 def sealed_lids(reference: Head, rim, skin, eye, side: str) -> np.ndarray:
     """Skin vertices (n, 3) with the backs of closed lids drawn up behind their margins, so that the lids meet over the
     whole of a lid's thickness and not on one edge, which a smooth surface through them would round off."""

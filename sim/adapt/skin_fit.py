@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import csr_matrix, vstack
+from scipy.spatial import cKDTree
 
 from ..anatomy.head import Head, SurfacePoints
 from ..anatomy.landmark_names import SKIN
@@ -19,6 +20,7 @@ from .thin_plate_spline import ThinPlateSpline, WarpChain, similarity
 
 EAR_MARKS = ("sa", "sba", "pra", "pa", "obs", "obi", "t")
 STIFF = tuple(f"{x}_{s}" for x in ("lid_upper", "lid_lower", "nostril") for s in ("l", "r"))
+AROUND_EAR = 9.0  # mm
 CARRIED = 60.0  # smoothing of the first warp at a landmark that was not given, mm
 PICKED = 1.0  # the same at a given one, per mm of its uncertainty
 LID_MARKS = ("ps_l", "ps_r", "pi_l", "pi_r")
@@ -34,6 +36,7 @@ class SkinFit:
     landmarks : name -> (3,) mm, given and completed targets
     outer (t, 3) : triangles a scanner can see; target : the scan as used (turned if it was inside out)
     closed : sides ("l", "r") of closed eyes
+    unseen (n,) bool : vertices on and around ears that the scan does not show
     """
 
     chain: WarpChain
@@ -42,6 +45,7 @@ class SkinFit:
     outer: np.ndarray
     target: Surface
     closed: list[str]
+    unseen: np.ndarray
 
 
 def group(head: Head, name: str) -> np.ndarray:
@@ -93,7 +97,8 @@ def fit_skin(reference: Head, target: Surface, given: dict[str, np.ndarray]) -> 
     now = np.concatenate([rows @ moved, moved[margin]])
     aim[: len(names)] = np.where(known[:, None], goal, now[: len(names)])
     pairs = Pairs(now, aim, give, len(names))
-    calm = refinable(reference, outer, rim)
+    unseen = unseen_ears(reference, given)
+    calm = refinable(reference, outer, rim | unseen)
     work = refine(moved, calm, target, feature_triangles(reference, names), pairs)
     warps = None
     while warps is None:
@@ -106,7 +111,7 @@ def fit_skin(reference: Head, target: Surface, given: dict[str, np.ndarray]) -> 
         chain = chain.then(warp)
         moved = warp.transform(moved)
 
-    free, stiffness = freedom(reference, given, rim)
+    free, stiffness = freedom(reference, given, rim, unseen)
     weight = np.where(known, [HOLD / sigma(name) ** 2 for name in names], 0.0)
     weight[np.isin(names, LID_MARKS)] *= 0.1 if len(margin) else 1.0
     matrix, _ = similarity(skin.vertices, moved)
@@ -124,7 +129,7 @@ def fit_skin(reference: Head, target: Surface, given: dict[str, np.ndarray]) -> 
             yield Progress(0.4 + 0.6 * next(work), "Reach the scan")
         except StopIteration as stop:
             fitted = stop.value
-    return SkinFit(chain, fitted, landmarks, outer, target, closed)
+    return SkinFit(chain, fitted, landmarks, outer, target, closed, unseen)
 
 
 def feature_triangles(reference: Head, names) -> np.ndarray:
@@ -151,16 +156,23 @@ def refinable(reference: Head, outer: np.ndarray, rim: np.ndarray) -> np.ndarray
     return outer[~folds[outer].any(axis=1)]
 
 
-def freedom(reference: Head, given, rim):
+def unseen_ears(reference: Head, given) -> np.ndarray:
+    """(n,) bool: ears without landmarks, and the skin close around them: hair lies there."""
+    out = np.zeros(len(reference.skin.vertices), dtype=bool)
+    for side, seen in seen_ears(given).items():
+        ear = group(reference, f"ear_{side}") > 0.3
+        if not seen and ear.any():
+            out |= cKDTree(reference.skin.vertices[ear]).query(reference.skin.vertices)[0] < AROUND_EAR
+    return out
+
+
+def freedom(reference: Head, given, rim, unseen):
     """Which skin vertices look for data (n,) bool, and how stiff each is (n,)."""
     inner = group(reference, "inner") > 0.5
-    free = ~inner & ~rim
+    free = ~inner & ~rim & ~unseen
     stiffness = 1 + 3.0 * inner + 8.0 * rim + 2.0 * group(reference, "neck") + 1.0 * group(reference, "scalp")
     for name in STIFF:
         stiffness += 4.0 * group(reference, name)
-    for side, seen in seen_ears(given).items():
-        ear = group(reference, f"ear_{side}")
-        stiffness += (4.0 if seen else 60.0) * ear
-        if not seen:  # hair lies where the ear would be
-            free &= ear < 0.5
-    return free, stiffness
+    for side in ("l", "r"):
+        stiffness += 4.0 * group(reference, f"ear_{side}")
+    return free, stiffness + 40.0 * unseen

@@ -110,10 +110,7 @@ def untangled(reference, vertices, faces, triangles, visible, hold=None, rounds:
     out = np.array(vertices, dtype=float)
     n = len(out)
     allowed = frozenset(map(tuple, sharp(reference, triangles).tolist()))
-    bend = laplacian(reference, faces)
-    energy = (bend.T @ bend).tocsr()
-    a, b = edges(faces).T
-    link = coo_matrix((np.ones(2 * len(a)), (np.r_[a, b], np.r_[b, a])), shape=(n, n)).tocsr()
+    energy, link = _matrices(reference, faces)
     patch = np.zeros(n, dtype=bool)
     best, fewest, among = out, None, None
     for turn in range(rounds):
@@ -132,10 +129,7 @@ def untangled(reference, vertices, faces, triangles, visible, hold=None, rounds:
             patch &= ~hold
         among = patch[triangles].any(axis=1)
         out = np.array(vertices, dtype=float)
-        _, label = connected_components(link[patch][:, patch], directed=False)
-        rows = np.flatnonzero(patch)
-        for k in range(label.max() + 1):
-            fill(reference, out, energy, link, rows[label == k])
+        _fill_all(reference, out, energy, link, patch)
     # A patch that would change the likeness more than its tangle does, stays as it was.
     moved = np.linalg.norm(best - vertices, axis=1)
     _, label = connected_components(link[moved > 0][:, moved > 0], directed=False)
@@ -147,7 +141,30 @@ def untangled(reference, vertices, faces, triangles, visible, hold=None, rounds:
     return best
 
 
-def fill(reference, out, energy, link, rows):
+def restored(reference, vertices, faces, patch):
+    """Vertices (n, 3) with the reference's own shape where ``patch`` (n,) bool, fitted to what surrounds it."""
+    out = np.array(vertices, dtype=float)
+    if patch.any():
+        _fill_all(reference, out, *_matrices(reference, faces), patch)
+    return out
+
+
+def _matrices(reference, faces):
+    bend = laplacian(reference, faces)
+    n = len(reference)
+    a, b = edges(faces).T
+    link = coo_matrix((np.ones(2 * len(a)), (np.r_[a, b], np.r_[b, a])), shape=(n, n)).tocsr()
+    return (bend.T @ bend).tocsr(), link
+
+
+def _fill_all(reference, out, energy, link, patch):
+    _, label = connected_components(link[patch][:, patch], directed=False)
+    rows = np.flatnonzero(patch)
+    for k in range(label.max() + 1):
+        _fill(reference, out, energy, link, rows[label == k])
+
+
+def _fill(reference, out, energy, link, rows):
     """Replace the vertices ``rows`` of ``out`` by the smoothest continuation of what surrounds them."""
     near = np.zeros(len(out), dtype=bool)
     near[rows] = True
