@@ -7,6 +7,7 @@ All work in place on (n, 3) mm positions of the left side and the midline; `fini
 import numpy as np
 
 from ...sim.mesh import Mesh, vertex_normals
+from ...sim.mesh_subdivision import limit
 from .eye_frame import GAP, RADIUS
 from .skin_fit import fair
 from .skin_layout import HALF, ROWS, Layout
@@ -60,7 +61,35 @@ def _neck_edge(layout: Layout, x: np.ndarray) -> None:
 def _nose_tip(x: np.ndarray, tip: np.ndarray) -> None:
     """A little of the projection that averaging takes off."""
     near = np.exp(-((x - tip) ** 2).sum(axis=1) / (2 * 9.0**2))
-    x += near[:, None] * np.array([0, -1.6, 1.0])
+    x += near[:, None] * np.array([0, -1.3, 0.4])
+
+
+def _nostril_rim(layout: Layout, x: np.ndarray) -> None:
+    """The wing's rim hangs over the opening, which is not seen from the front."""
+    rim = layout.rings["nostril_l"][0]
+    x[rim[[5, 6, 7]]] += np.array([[0.2, -0.1, -0.4], [0.1, -0.3, -0.8], [0, -0.2, -0.6]])
+    for (u, v), step in {(4, 13): (0.2, -0.1, -0.2), (4, 14): (0.2, -0.1, -0.1)}.items():
+        x[layout.grid[v, u]] += step
+
+
+def _against_rounding(layout: Layout, x: np.ndarray, strength: float = 0.5) -> np.ndarray:
+    """Nose and jaw stand out by what subdivision will round off them: their limit surface is the shape measured."""
+    weight = np.zeros(layout.count)
+    for u in range(-12, 13):
+        for v in range(8, 27):
+            vertex = layout.grid[v, u % (2 * HALF)]
+            if vertex >= 0:
+                nose = np.interp(abs(u), [0, 2, 3, 5, 7], [0.2, 0.4, 1, 1, 0.4]) * np.interp(
+                    v, [8, 10, 15, 16], [0, 1, 1, 0.5]
+                )
+                jaw = np.interp(v, [20, 22, 26], [0, 1, 1]) * np.interp(abs(u), [10, 12], [1, 0])
+                weight[vertex] = max(nose, jaw)
+    weight[np.concatenate([layout.rings["nostril" + side][0] for side in ("_l", "_r")])] = 1
+    smooth = limit(layout.faces, layout.count)
+    out = x.copy()
+    for _ in range(2):
+        out += strength * weight[:, None] * (x - smooth @ out)
+    return out
 
 
 def _lids(layout: Layout, x: np.ndarray) -> None:
@@ -229,6 +258,8 @@ def finish_shape(layout: Layout, vertices: np.ndarray) -> np.ndarray:
     x = both_sides(_smooth_outside(layout, vertices)[layout.left])
     _neck_edge(layout, x)
     _nose_tip(x, x[layout.grid[12, 0]])
+    _nostril_rim(layout, x)
+    x = both_sides(_against_rounding(layout, both_sides(x[layout.left]))[layout.left])
     _ear(layout, x)
     _nostril(layout, x)
     _lids(layout, x)
