@@ -103,8 +103,8 @@ def refuse_poor(report: dict) -> None:
     """Raise `InputError` for a fit that missed the scan."""
     if report["coverage"] < LITTLE:
         raise InputError(
-            f"Only {report['coverage']:.0%} of the face lies near the scan: check that scan and landmarks belong together, "
-            "and that the scan shows a face."
+            f"Only {report['coverage']:.0%} of the face lies near the scan: check that scan and landmarks belong "
+            "together, and that the scan shows a face."
         )
     if report["mean_mm"] > POOR:
         raise InputError(

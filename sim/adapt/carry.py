@@ -81,7 +81,7 @@ def carry(reference: Head, fit: SkinFit) -> Work:
     for side in fit.closed:  # closed lids lie too close for the reference's open ones to be restored
         for lid in ("lid_upper", "lid_lower"):
             shut |= group(reference, f"{lid}_{side}") > 0.2
-    final = restored(skin.vertices, final, skin.faces, fit.unseen)
+    final = restored(skin.vertices, final, skin.faces, fit.unseen, scale)
     final = untangled(skin.vertices, final, skin.faces, triangles, ~(inner | fit.unseen), shut)
 
     yield Progress(0.5, "Bone under the skin")

@@ -44,8 +44,8 @@ def check_against_scan(landmarks: dict[str, np.ndarray], scan: Mesh | Surface) -
     distance = np.median(surface.closest(points).distance)
     if distance > AWAY:
         raise InputError(
-            f"Half of the landmarks lie more than {distance:.0f} mm from the scan: give landmarks picked on this scan, in "
-            "its own place, axes and units."
+            f"Half of the landmarks lie more than {distance:.0f} mm from the scan: give landmarks picked on this scan, "
+            "in its own place, axes and units."
         )
 
 
@@ -77,8 +77,8 @@ def check_arrangement(reference: dict[str, np.ndarray], given: dict[str, np.ndar
         # All sides exchanged is a mirrored face: it fits with the sides put right.
         if rms > 8.0 and turned < 0.5 * rms and turned < UNLIKE:
             raise InputError(
-                "The landmarks' left and right are exchanged: _l is the subject's own left, so swap the names, or mirror "
-                "the scan if it is mirrored."
+                "The landmarks' left and right are exchanged: _l is the subject's own left, so swap the names, or "
+                "mirror the scan if it is mirrored."
             )
         for k, name in enumerate(names):
             other = mirrored(name)
@@ -104,12 +104,13 @@ def check_arrangement(reference: dict[str, np.ndarray], given: dict[str, np.ndar
     if rms > UNLIKE:
         worst = names[int(residual.argmax())]
         raise InputError(
-            f'The landmarks do not form a face ({rms:.0f} mm from any likeness, worst "{worst}"): check their names and '
-            "places against the scan."
+            f'The landmarks do not form a face ({rms:.0f} mm from any likeness, worst "{worst}"): check their names '
+            "and places against the scan."
         )
     if not SCALE[0] < scale < SCALE[1]:
         raise InputError(
-            f"The landmarks make a head {scale:.2g} times the size of an adult's: check the units of scan and landmarks."
+            f"The landmarks make a head {scale:.2g} times the size of an adult's: check the units of scan and "
+            "landmarks."
         )
 
 

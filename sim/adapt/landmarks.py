@@ -117,8 +117,8 @@ def require_usable(positions: dict[str, np.ndarray], source: str = "The landmark
     """Raise `InputError` unless there are four or more landmarks, not in one plane, no two in one place."""
     if len(positions) < LEAST:
         raise InputError(
-            f"{source} gives {len(positions)} landmark{'s' * (len(positions) != 1)}; a head needs at least {LEAST} that "
-            "do not lie in one plane: add some, such as ex_l, ex_r, prn and gn."
+            f"{source} gives {len(positions)} landmark{'s' * (len(positions) != 1)}; a head needs at least {LEAST} "
+            "that do not lie in one plane: add some, such as ex_l, ex_r, prn and gn."
         )
     names = list(positions)
     points = np.array([positions[n] for n in names], dtype=float)
@@ -130,7 +130,8 @@ def require_usable(positions: dict[str, np.ndarray], source: str = "The landmark
         sides = any(n.endswith(("_l", "_r")) for n in names)
         add = "such as prn (the tip of the nose) or t_l and t_r" if sides else "such as ex_l and ex_r"
         raise InputError(
-            f"{source} gives {len(names)} landmarks that lie in one plane, which cannot place a head: add others, {add}."
+            f"{source} gives {len(names)} landmarks that lie in one plane, which cannot place a head: add others, "
+            f"{add}."
         )
 
 

@@ -36,9 +36,9 @@ def factorised(matrix):
 def solve_displacement(smooth, sampling, blocks, pulls, start):
     """The displacement (n, 3) that minimises ``u^T smooth u + sum_s (S u - g)_s^T W_s (S u - g)_s``.
 
-    smooth (n, n) the same for x, y, z; sampling S (s, n); blocks W (s, 3, 3); pulls W g (s, 3), mm; start (n, 3) a first
-    guess. Solved by conjugate gradients, preconditioned with the factorised system whose blocks are all isotropic: a few
-    steps, and each axis alone in the factor.
+    smooth (n, n) the same for x, y, z; sampling S (s, n); blocks W (s, 3, 3); pulls W g (s, 3), mm; start (n, 3) a
+    first guess. Solved by conjugate gradients, preconditioned with the factorised system whose blocks are all
+    isotropic: a few steps, and each axis alone in the factor.
     """
     n = sampling.shape[1]
     count = len(blocks)

@@ -141,11 +141,14 @@ def untangled(reference, vertices, faces, triangles, visible, hold=None, rounds:
     return best
 
 
-def restored(reference, vertices, faces, patch):
-    """Vertices (n, 3) with the reference's own shape where ``patch`` (n,) bool, fitted to what surrounds it."""
+def restored(reference, vertices, faces, patch, scale=None):
+    """Vertices (n, 3) with the reference's own shape where ``patch`` (n,) bool, fitted to what surrounds it.
+
+    ``scale`` : size of the head relative to the reference, if the patch is to have that and not its surroundings' own.
+    """
     out = np.array(vertices, dtype=float)
     if patch.any():
-        _fill_all(reference, out, *_matrices(reference, faces), patch)
+        _fill_all(reference, out, *_matrices(reference, faces), patch, scale)
     return out
 
 
@@ -157,14 +160,14 @@ def _matrices(reference, faces):
     return (bend.T @ bend).tocsr(), link
 
 
-def _fill_all(reference, out, energy, link, patch):
+def _fill_all(reference, out, energy, link, patch, scale=None):
     _, label = connected_components(link[patch][:, patch], directed=False)
     rows = np.flatnonzero(patch)
     for k in range(label.max() + 1):
-        _fill(reference, out, energy, link, rows[label == k])
+        _fill(reference, out, energy, link, rows[label == k], scale)
 
 
-def _fill(reference, out, energy, link, rows):
+def _fill(reference, out, energy, link, rows, scale):
     """Replace the vertices ``rows`` of ``out`` by the smoothest continuation of what surrounds them."""
     near = np.zeros(len(out), dtype=bool)
     near[rows] = True
@@ -173,6 +176,10 @@ def _fill(reference, out, energy, link, rows):
         near |= link @ near.astype(float) > 0
     ring = np.flatnonzero(near & ~inside)
     matrix, shift = similarity(reference[ring], out[ring])
+    if scale is not None:
+        smaller = matrix * (scale / np.cbrt(np.linalg.det(matrix)))
+        shift = shift + (matrix - smaller) @ reference[ring].mean(axis=0)
+        matrix = smaller
     base = reference @ matrix.T + shift
     right = -(energy[rows][:, ring] @ (out - base)[ring])
     out[rows] = base[rows] + factorised(energy[rows][:, rows])(right)
