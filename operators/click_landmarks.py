@@ -19,7 +19,7 @@ class HEADSHOP_OT_click_landmarks(bpy.types.Operator):
     bl_label = "Click Landmarks"
     bl_options = {"REGISTER", "UNDO"}
 
-    start: bpy.props.StringProperty(name="Start With", description="Ask for this landmark first", options={"SKIP_SAVE"})
+    start: bpy.props.StringProperty(name="Landmark", description="Ask for this landmark only", options={"SKIP_SAVE"})
 
     @classmethod
     def poll(cls, context):
@@ -94,7 +94,7 @@ class HEADSHOP_OT_click_landmarks(bpy.types.Operator):
         landmarks.put(self._scan, self._name, hit / METRES)
         landmarks.follow(self._scan)
         self._chosen = None
-        return self._ask(context)
+        return self._end(context) if self.start else self._ask(context)
 
     def _remember(self):
         self._steps.append((landmarks.snapshot(self._scan), list(self._skipped), self._chosen))

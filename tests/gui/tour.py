@@ -76,7 +76,7 @@ def click_landmarks():
 
 
 def build():
-    """Esc in the middle leaves nothing; the second time the head is built."""
+    """Esc in the middle leaves nothing; the second time the head is built, in one step for undo and redo."""
     before = ask("counts()")
     scroll_up()
     press("build_head")
@@ -90,6 +90,14 @@ def build():
     start = time.monotonic()
     wait_for("skin() is not None and not job()", 400)
     say(f"built in {time.monotonic() - start:.1f} s")
+    after = ask("counts()")
+    point(600, 850)
+    key("ctrl+z")
+    wait_for("skin() is None", 20)
+    assert ask("counts()") == before
+    key("ctrl+shift+z")
+    wait_for("skin() is not None", 20)
+    assert ask("counts()") == after
     shot("08_built")
 
 
