@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """All that lies under a reference skin: bone, eyes, teeth, tongue, muscles, made each in its turn."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -41,6 +41,7 @@ def make_anatomy(skin: Mesh, groups: dict[str, np.ndarray], landmarks: dict[str,
     yield Progress(0.6, "Eyes, teeth, tongue")
     eye_meshes, eye_frames = eyes.make_eyes(skin, groups, landmarks)
     upper, lower = teeth.make_teeth(skin, groups, landmarks)
+    jaw = replace(jaw, incisor=teeth.incisor_edge(lower))
     parts = {
         "skull": cranium,
         "mandible": jaw_bone,

@@ -109,7 +109,7 @@ def make_mandible(skin: Mesh, groups: dict[str, np.ndarray], landmarks: dict[str
 
 
 def make_jaw(skin: Mesh, groups: dict[str, np.ndarray], landmarks: dict[str, np.ndarray]) -> Jaw:
-    """The hinge through the condyles; the incisor point is refined once the teeth stand."""
+    """The hinge through the condyles; the incisor point is a guess until the teeth stand."""
     space = BoneSpace(skin, groups, landmarks)
     left = condyle_centre(space)
     incisor = space.targets["id"] * [0, 1, 1] + [0, 1.5, 9.5]

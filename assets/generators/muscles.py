@@ -118,7 +118,7 @@ class _Maker:
         count = len(fibres)
         p = self.points
         front, rear = fibres[0, 0], fibres[-1, 0]
-        high = (front + rear) / 2 + np.array([6.0, 0.0, 30.0])
+        high = (front + rear) / 2 + np.array([6.0, 0.0, 34.0])
         origin = curve(
             [front, front * 0.55 + high * 0.45 + [2, -4, 8], high, rear * 0.55 + high * 0.45 + [2, 6, 10], rear], count
         )
@@ -132,7 +132,7 @@ class _Maker:
         foot, normal = self.tissue.foot(out[:, 0])
         deep = 0.9 * self.tissue.thickness(foot, normal, lining=False)
         out[:, 0] = foot - deep[:, None] * normal
-        return out
+        return evened(out, 1, ends=False)
 
     def _within(self, fibres, clear):
         """Last word: out of the bone, under the skin."""

@@ -74,6 +74,15 @@ def make_teeth(skin: Mesh, groups: dict[str, np.ndarray], landmarks: dict[str, n
     return mouth.kept_in(upper), mouth.kept_in(lower)
 
 
+def incisor_edge(teeth_lower: Mesh) -> np.ndarray:
+    """(3,) mm, the point between the biting edges of the lower middle incisors."""
+    enamel = np.unique(teeth_lower.faces[teeth_lower.material == 0][:, :3])
+    near = teeth_lower.vertices[enamel]
+    near = near[np.abs(near[:, 0]) < 4.0]
+    edge = near[near[:, 2] > near[:, 2].max() - 0.6].mean(axis=0)
+    return edge * [0, 1, 1]
+
+
 def _row(teeth, outer, edge, rise, mouth):
     """One row: ``outer`` (k, 2) the labial line of the left side, ``edge`` z of the incisors, ``rise`` +1 upper, -1 lower."""
     length = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(outer, axis=0), axis=1))])
