@@ -90,7 +90,11 @@ def anatomy_tiles(skin: bpy.types.Object) -> list[Tile]:
         tiles.append(
             Tile("Under the skin", "one anatomy for every head", ("half", "features", "bones", "muscles"), yaw=22.0)
         )
-        tiles.append(Tile("Muscles", f"{len(muscles)} that pull", ("features", "bones", "muscles"), yaw=SIDE_YAW))
+        tiles.append(
+            Tile(
+                "Muscles", f"{len(muscles)}, over skull and hinged jaw", ("features", "bones", "muscles"), yaw=SIDE_YAW
+            )
+        )
     if scan is None or not muscles:
         tiles.append(Tile("Skull", "hinged jaw", ("features", "bones"), yaw=SIDE_YAW))
     return tiles

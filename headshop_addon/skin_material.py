@@ -64,18 +64,26 @@ def _write(graph: Graph, image) -> None:
     roughness = graph.math("SUBTRACT", roughness, graph.math("MULTIPLY", lip, 0.14))
     roughness = graph.math("SUBTRACT", roughness, graph.math("MULTIPLY", wet, 0.22))
     sebum = graph.math("ADD", graph.math("MULTIPLY", shine, 0.10), graph.math("MULTIPLY", wet, 0.6))
+    gloss = graph.math("ADD", 0.46, graph.math("MULTIPLY", lip, 0.2))
+    coat = graph.math("ADD", 0.05, sebum)
+    if image is not None:
+        # what the scan saw darker than any skin is hair, a cap, a collar: dull
+        brightness = graph.vector("DOT_PRODUCT", base, (0.2126, 0.7152, 0.0722))
+        skin = graph.math("MAXIMUM", graph.smooth(brightness, 0.015, 0.065), wet)
+        gloss, coat = (graph.math("MULTIPLY", value, skin) for value in (gloss, coat))
+        roughness = graph.math("ADD", roughness, graph.smooth(skin, 0.0, 1.0, 0.3, 0.0))
     shader = graph.node(
         "BsdfPrincipled",
         {
             "Base Color": colour,
             "Roughness": roughness,
             "IOR": 1.4,
-            "Specular IOR Level": graph.math("ADD", 0.46, graph.math("MULTIPLY", lip, 0.2)),
+            "Specular IOR Level": gloss,
             "Subsurface Weight": 1.0,
             "Subsurface Radius": RADIUS,
             "Subsurface Scale": SCALE_M,
             # a thin film of sebum: the second, sharper lobe of skin's reflection
-            "Coat Weight": graph.math("ADD", 0.05, sebum),
+            "Coat Weight": coat,
             "Coat Roughness": 0.28,
             "Coat IOR": 1.4,
             "Normal": graph.bump(grain, 0.00035, 0.7),

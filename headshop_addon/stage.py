@@ -132,7 +132,7 @@ def aim_camera(
     camera = _own_object(_own_collection(scene), "Camera", bpy.data.cameras.new)
     camera.data.lens, camera.data.sensor_fit, camera.data.sensor_height = LENS_MM, "VERTICAL", 36.0
     # In head heights: from above the crown to the throat; a narrow picture must still hold both ears.
-    top, bottom = (0.47, -0.75) if close else (0.60, -0.74)
+    top, bottom = (0.38, -0.77) if close else (0.60, -0.74)
     seen = frame.height * max(top - bottom, 0.95 / aspect)
     distance = seen * LENS_MM / 36.0 + 0.25 * frame.height
     target = frame.centre + frame.up * (top + bottom) / 2 * frame.height + frame.back * 0.15 * frame.height
