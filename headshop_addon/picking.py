@@ -19,9 +19,8 @@ def viewport_region(area, x: int, y: int):
     return inside[0] if inside else None
 
 
-#: Pixels around the mouse that are looked at where the scan has a hole, and how much farther than they (m) a hit must
-#: be to count as one through a hole, on the far side of the head.
-_RINGS, _THROUGH = (5.0, 10.0, 18.0), 0.02
+#: Pixels around the mouse that are looked at where the scan has a hole.
+_RINGS = (5.0, 10.0, 18.0)
 
 
 def on_surface(context, area, region, at, obj):
@@ -39,19 +38,19 @@ def on_surface(context, area, region, at, obj):
         start = to_local @ region_2d_to_origin_3d(region, view, where)
         return start, (turn @ region_2d_to_vector_3d(region, view, where)).normalized()
 
-    def depth(dx, dy):
+    def hit(dx, dy):
+        """Depth of what is hit and whether its outside is seen; (None, False) where nothing is."""
         start, along = ray(dx, dy)
-        hit, point, _normal, _face = obj.ray_cast(start, along, depsgraph=graph)
-        return (point - start).length if hit else None
+        found, point, normal, _face = obj.ray_cast(start, along, depsgraph=graph)
+        return ((point - start).length, normal.dot(along) < 0) if found else (None, False)
 
     start, along = ray(0, 0)
-    found = depth(0, 0)
-    for radius in _RINGS:
-        turns = [k * math.tau / 8 for k in range(8)]
-        around = [depth(radius * math.cos(a), radius * math.sin(a)) for a in turns]
-        rim = [d for d in around if d is not None]
+    depth, outside = hit(0, 0)
+    turns = [k * math.tau / 8 for k in range(8)]
+    for radius in () if outside else _RINGS:  # the inside of the far wall is seen through a hole only
+        around = [hit(radius * math.cos(a), radius * math.sin(a)) for a in turns]
+        rim = [d for d, seen in around if seen]
         if len(rim) >= 3:
-            if found is None or found > median(rim) + _THROUGH:
-                found = median(rim)
+            depth = median(rim)
             break
-    return None if found is None else start + along * found
+    return None if depth is None else start + along * depth

@@ -76,7 +76,7 @@ class HEADSHOP_OT_click_landmarks(bpy.types.Operator):
             self._remember()
             self._skipped.append(self._name)
             self._chosen = None
-            return self._ask(context)
+            return self._end(context) if self.start else self._ask(context)
         if event.type in {"LEFTMOUSE", "RIGHTMOUSE", "Z"}:
             return {"RUNNING_MODAL"}
         return {"PASS_THROUGH"}

@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A click lands on the scan, over a hole at the depth of its rim, and nowhere outside."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+SIDE = 0.2  # m seen across the view
+
+
+@pytest.fixture
+def view(bpy):
+    """An orthographic view from the front, 200 pixels for `SIDE`: (area, region)."""
+    from mathutils import Matrix
+
+    turn = Matrix.Rotation(np.pi / 2, 4, "X")  # from Blender's camera axes to a camera that looks along +Y
+    looking = (Matrix.Translation((0, -1, 0)) @ turn).inverted()
+    window = Matrix.Diagonal((2 / SIDE, 2 / SIDE, -0.01, 1))
+    rv3d = SimpleNamespace(view_matrix=looking, perspective_matrix=window @ looking, is_perspective=False)
+    rv3d.view_perspective = "ORTHO"
+    area = SimpleNamespace(spaces=SimpleNamespace(active=SimpleNamespace(region_3d=rv3d)))
+    return area, SimpleNamespace(width=200, height=200)
+
+
+@pytest.fixture
+def scan(bpy):
+    """A wall at y = -0.1 m with a hole of 12 mm in its middle, and the far side of the head at y = +0.1."""
+    from headshop.headshop_addon import bridge
+    from headshop.sim.mesh import Mesh
+
+    line = np.linspace(-80, 80, 81)
+    x, z = np.meshgrid(line, line)
+    corner = np.arange(81 * 81).reshape(81, 81)
+    faces = np.stack([corner[:-1, :-1], corner[:-1, 1:], corner[1:, 1:], corner[1:, :-1]], axis=-1).reshape(-1, 4)
+    points = np.stack([x, np.full_like(x, -100), z], axis=-1).reshape(-1, 3)
+    near = faces[np.linalg.norm(points[faces].mean(axis=1)[:, [0, 2]], axis=1) > 6]
+    far, outward = points * [1, -1, 1], (faces + len(points))[:, ::-1]
+    mesh = Mesh(np.concatenate([points, far]), np.concatenate([near, outward]).astype(np.int32))
+    obj = bridge.mesh_to_object(mesh, "Scan")
+    bpy.context.scene.collection.objects.link(obj)
+    bpy.context.view_layer.update()
+    return obj
+
+
+@pytest.mark.parametrize(
+    ("at", "expected"),
+    [
+        ((151, 121), (0.051, -0.1, 0.021)),  # on the wall
+        ((100, 100), (0.0, -0.1, 0.0)),  # in the hole: in mid-air, not on the far side
+        ((103, 98), (0.003, -0.1, -0.002)),
+        ((199, 199), None),  # beside the scan
+    ],
+)
+def test_a_click_lands_on_the_scan_or_over_its_hole(bpy, view, scan, at, expected):
+    from headshop.headshop_addon import picking
+
+    point = picking.on_surface(bpy.context, *view, at, scan)
+    assert (point is None) == (expected is None)
+    if expected is not None:
+        assert tuple(point) == pytest.approx(expected, abs=1e-4)
+
+
+def test_a_scan_turned_inside_out_is_hit_all_the_same(bpy, view, scan):
+    from headshop.headshop_addon import picking
+
+    scan.data.flip_normals()
+    scan.data.update()
+    bpy.context.view_layer.update()
+    point = picking.on_surface(bpy.context, *view, (151, 121), scan)
+    assert tuple(point) == pytest.approx((0.051, -0.1, 0.021), abs=1e-4)
+
+
+def test_a_moved_and_scaled_scan_is_hit_in_its_own_space(bpy, view, scan):
+    from headshop.headshop_addon import picking
+
+    scan.scale = (2, 2, 2)
+    scan.location = (0.02, 0.0, 0.0)
+    bpy.context.view_layer.update()
+    point = picking.on_surface(bpy.context, *view, (151, 121), scan)
+    assert tuple(point) == pytest.approx((0.0155, -0.1, 0.0105), abs=1e-4)
+
+
+def test_clicks_on_the_sidebar_are_not_clicks_on_the_scan(blender):
+    from headshop.headshop_addon import picking
+
+    window = SimpleNamespace(type="WINDOW", x=0, y=0, width=1000, height=800)
+    sidebar = SimpleNamespace(type="UI", x=800, y=0, width=200, height=800)
+    closed = SimpleNamespace(type="TOOLS", x=0, y=0, width=1, height=800)
+    area = SimpleNamespace(regions=[closed, sidebar, window])
+    assert picking.viewport_region(area, 400, 300) is window
+    assert picking.viewport_region(area, 0, 300) is window
+    assert picking.viewport_region(area, 900, 300) is None
+    assert picking.viewport_region(area, 400, 900) is None
