@@ -15,6 +15,7 @@ from scipy.spatial import cKDTree
 from ..anatomy.head import Head
 from ..mesh import vertex_normals
 from .arch import Arch, build_arches
+from .geometry import short_diagonals
 from .layers import Layers
 from .lids import eyeball_radius
 from .planes import Planes, empty_planes
@@ -58,7 +59,9 @@ def build_surfaces(head: Head, layers: Layers, ties: np.ndarray) -> Surfaces:
     lip_u, lip_l = (np.asarray(head.groups.get(k, zero)) for k in ("lip_upper", "lip_lower"))
     skin = head.skin.vertices
     apart = np.einsum(
-        "ij,ij->i", skin[ties[:, 1]] - skin[ties[:, 0]], vertex_normals(skin, head.skin.triangles)[ties[:, 1]]
+        "ij,ij->i",
+        skin[ties[:, 1]] - skin[ties[:, 0]],
+        vertex_normals(skin, short_diagonals(head.skin.vertices, head.skin.faces))[ties[:, 1]],
     )
     return Surfaces(
         arches=build_arches(head, layers),
@@ -67,7 +70,7 @@ def build_surfaces(head: Head, layers: Layers, ties: np.ndarray) -> Surfaces:
         lip_lower=np.flatnonzero((lip_l > 0.3) & free),
         sheets=ties[apart > 0.1],
         sheet_gap=apart[apart > 0.1],
-        triangles=head.skin.triangles,
+        triangles=short_diagonals(head.skin.vertices, head.skin.faces),
     )
 
 
@@ -106,7 +109,7 @@ def build_bones(head: Head, layers: Layers) -> tuple[Bone, ...]:
         if not len(column):
             continue
         mesh = head.parts[part]
-        tri = mesh.triangles
+        tri = short_diagonals(mesh.vertices, mesh.faces)
         at_vertex = vertex_normals(mesh.vertices, tri)
         points = np.concatenate([mesh.vertices, mesh.vertices[tri].mean(axis=1)])
         normal = np.concatenate([at_vertex, at_vertex[tri].mean(axis=1)])

@@ -101,7 +101,7 @@ def system_matrix(model: Model) -> dict:
     layers, springs, p = model.layers, model.springs, model.parameters
     n = model.count
     laplacian = model.bending
-    bend = bending_stiffness(model) * (laplacian.T @ sparse.diags(layers.sheet / layers.area) @ laplacian)
+    bend = bending_stiffness(model) * (laplacian.T @ sparse.diags(np.sqrt(layers.sheet) / layers.area) @ laplacian)
     hold = np.concatenate([0.15 * layers.restoration, 0.85 * layers.restoration])
     quadratic = sparse.block_diag([0.7 * bend, 0.3 * bend], format="csr") + sparse.diags(hold)
     lid = np.zeros(2 * n)

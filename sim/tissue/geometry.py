@@ -35,6 +35,17 @@ def _dot(x, y):
     return np.einsum("ij,ij->i", x, y)
 
 
+def short_diagonals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """(t, 3) triangles of a face table (m, 4): quads split along their shorter diagonal, so that mirrored quads split
+    alike and a symmetric head acts symmetrically."""
+    quad = faces[:, 3] >= 0
+    q = faces[quad]
+    one = np.linalg.norm(vertices[q[:, 0]] - vertices[q[:, 2]], axis=1)
+    other = np.linalg.norm(vertices[q[:, 1]] - vertices[q[:, 3]], axis=1)
+    q = np.where((other < one - 1e-4)[:, None], q[:, [1, 2, 3, 0]], q)
+    return np.concatenate([faces[~quad][:, :3], q[:, [0, 1, 2]], q[:, [0, 2, 3]]])
+
+
 class Surface:
     """Closest-point queries on a triangle mesh: the nearest ``tries`` triangles by centroid are looked at."""
 

@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from ..anatomy.head import Head
 from ..mesh import vertex_normals
-from .geometry import Surface, cotangent_stiffness, smoothed, vertex_areas
+from .geometry import Surface, cotangent_stiffness, short_diagonals, smoothed, vertex_areas
 from .parameters import Parameters
 from .structures import Layers
 
@@ -42,7 +42,7 @@ def _sides(groups, name):
 def build_layers(head: Head, parameters: Parameters) -> Layers:
     """The columns of ``head``; the rest position of every node."""
     skin = head.skin
-    v, tri = skin.vertices, skin.triangles
+    v, tri = skin.vertices, short_diagonals(skin.vertices, skin.faces)
     n = len(v)
     groups = {k: np.asarray(w, float) for k, w in head.groups.items()}
     normal = vertex_normals(v, tri)
@@ -50,17 +50,16 @@ def build_layers(head: Head, parameters: Parameters) -> Layers:
     stiffness = cotangent_stiffness(v, tri)
     area = np.maximum(area, 1e-2)
 
-    surfaces = [Surface(head.parts[part].vertices, head.parts[part].triangles) for part in ("skull", "mandible")]
-    point, which, distance = zip(*(s.closest(v) for s in surfaces), strict=True)
+    bones = [head.parts[part] for part in ("skull", "mandible")]
+    surfaces = [Surface(b.vertices, short_diagonals(b.vertices, b.faces)) for b in bones]
+    point, _, distance = zip(*(s.closest(v) for s in surfaces), strict=True)
     nearer = (distance[1] < distance[0]).astype(int)
     row = np.arange(n)
     bone_point, bone_distance = np.stack(point)[nearer, row], np.stack(distance)[nearer, row]
-    bone_normal = np.stack([s.normal[w] for s, w in zip(surfaces, which, strict=True)])[nearer, row]
     toward = (bone_point - v) / np.maximum(bone_distance, 1e-6)[:, None]
     facing = -np.einsum("ij,ij->i", toward, normal)
-    # a bone triangle may be wound either way and thin plates have two sides: outward is toward this skin
-    flip = np.einsum("ij,ij->i", bone_normal, toward) > 0
-    bone_normal[flip] *= -1
+    # the way from a closest point to its surface is along the surface's normal, also at edges between triangles
+    bone_normal = -toward
 
     soft = np.zeros(n)
     depth = np.full(n, _OTHER[0])
@@ -124,7 +123,7 @@ def sheet_ties(head: Head, layers: Layers, reach: float = 9.0) -> np.ndarray:
     if not len(outer) or not len(inside):
         return np.zeros((0, 2), int)
     fascia = layers.nodes[n : 2 * n]
-    normal = vertex_normals(head.skin.vertices, head.skin.triangles)
+    normal = vertex_normals(head.skin.vertices, short_diagonals(head.skin.vertices, head.skin.faces))
     distance, near = cKDTree(fascia[outer]).query(fascia[inside], min(4, len(outer)))
     distance, near = distance.reshape(len(inside), -1), near.reshape(len(inside), -1)
     a = np.repeat(inside, near.shape[1])

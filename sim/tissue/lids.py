@@ -15,6 +15,9 @@ from .structures import Lids
 LOWER_SHARE = 0.12
 #: Closed lids press on each other: rad beyond the first touch, against the rounding of their edges.
 _SEAL = 0.012
+#: rad between the margins of an open eye (11 mm on a ball of 12 mm), and how much of it a full levator restores to an
+#: eye that was scanned closed, per share by which it widens an open one.
+_OPEN, _WAKE = 0.9, 3.2
 
 
 def eye_profile(vertices: np.ndarray, eye: Eye) -> tuple[np.ndarray, np.ndarray]:
@@ -89,6 +92,8 @@ def build_lids(head: Head, layers: Layers, side: str) -> Lids | None:
             curves.append(_margin(np.array([middle[0]]), np.array([middle[1]]), corners))
     within = np.clip(along, a0, a1)
     opening = np.clip(curves[0](within) - curves[1](within), 0, 1.4)
+    across = np.clip((2 * within - a0 - a1) / (a1 - a0), -1, 1)
+    missing = np.clip(_OPEN * (1 - across**2) - opening, 0, None) * float(opening.max() < 0.5 * _OPEN)
     # weight: 1 at the margin, 0 where the lid's own group ends; the groups are taken as drawn, scaled to reach 1
     weight = np.clip(share[column] / max(np.percentile(share[column], 90), 1e-3), 0, 1)
     off = np.abs(elevation - np.where(upper, curves[0](within), curves[1](within)))
@@ -113,6 +118,7 @@ def build_lids(head: Head, layers: Layers, side: str) -> Lids | None:
         upper=upper,
         hold=weight**2 * np.where(inner, 0.5, 1.0),
         opening=opening,
+        missing=missing,
         contact_column=touching,
         clearance=clearance,
         profile_angle=profile_angle,
@@ -150,7 +156,8 @@ def lid_targets(lids: Lids, upper: float, lower: float, gaze: np.ndarray) -> np.
     """
     follow = float(gaze[1])
     seal = _SEAL * np.clip(upper, 0, 1) ** 4 * (lids.opening > 0)
-    turn_upper = -upper * (1 - LOWER_SHARE) * lids.opening - seal + 0.55 * follow * np.minimum(lids.opening / 0.5, 1)
+    travel = (1 - LOWER_SHARE) * lids.opening + (_WAKE * lids.missing if upper < 0 else 0.0)
+    turn_upper = -upper * travel - seal + 0.55 * follow * np.minimum(lids.opening / 0.5, 1)
     turn_lower = lower * LOWER_SHARE * lids.opening + (0.3 * min(follow, 0) + 0.1 * max(follow, 0)) * np.minimum(
         lids.opening / 0.5, 1
     )

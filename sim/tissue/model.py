@@ -10,7 +10,7 @@ from ..anatomy.head import JAW_PARTS, Head
 from . import calibration
 from .contact import build_surfaces
 from .energy import system_matrix
-from .geometry import cotangent_stiffness
+from .geometry import cotangent_stiffness, short_diagonals
 from .layers import build_layers, sheet_ties
 from .lids import build_lids
 from .muscle_field import build_muscle_field
@@ -38,13 +38,14 @@ def build_model(head: Head, parameters: Parameters = DEFAULT, table: dict | None
     layers = build_layers(head, parameters)
     n = len(layers.area)
     ties = sheet_ties(head, layers)
-    triangles = head.skin.triangles
+    triangles = short_diagonals(head.skin.vertices, head.skin.faces)
     prisms = np.concatenate([triangles, triangles + n], axis=1)
     # a prism pressed flat by a sharp fold of the skin has no volume to keep
     volume = prism_volumes(layers.nodes, prisms)
     moving = layers.free[:n][triangles].any(axis=1)
-    edge = np.linalg.norm(layers.nodes[triangles[:, 0]] - layers.nodes[triangles[:, 1]], axis=1)
-    kept = moving & (volume > 0.08 * edge**2)
+    corner = layers.nodes[triangles]
+    area = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1) / 2
+    kept = moving & (volume > 0.4 * area)  # a mean height of 0.4 mm
     laplacian = cotangent_stiffness(layers.nodes[:n], triangles)
     model = Model(
         parameters=parameters,

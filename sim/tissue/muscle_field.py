@@ -11,6 +11,7 @@ import numpy as np
 
 from ..anatomy.head import Head, Muscle
 from ..mesh import vertex_normals
+from .geometry import short_diagonals
 from .structures import Layers, MuscleField
 
 #: Muscles that move the mandible and no skin; `acting.pose` turns them into jaw motion.
@@ -120,7 +121,7 @@ def build_muscle_field(head: Head, layers: Layers, table: dict) -> MuscleField:
     n = len(layers.area)
     fascia = layers.nodes[n : 2 * n]
     usable = np.flatnonzero(layers.free[:n])
-    normals = vertex_normals(head.skin.vertices, head.skin.triangles)[usable]
+    normals = vertex_normals(head.skin.vertices, short_diagonals(head.skin.vertices, head.skin.faces))[usable]
     # lids are turned over the eyeball by `lids`; the eye sockets behind them have no muscle
     lid = np.max([np.asarray(head.groups.get(f"lid_{k}", np.zeros(n))) for k in _LIDS], axis=0)
     socket = np.asarray(head.groups.get("inner", np.zeros(n))) - np.asarray(head.groups.get("mouth_bag", np.zeros(n)))

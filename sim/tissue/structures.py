@@ -82,7 +82,8 @@ class Lids:
     column : (v,) skin vertices that ride on the lids; weight (v,) 1 at the margin, 0 where the lid ends
     axis, forward, up : the eye's frame; along, elevation, radius (v,) the cylindrical coordinates of each vertex
     hold (v,) share of the lid stiffness with which it is held to its place
-    upper : (v,) bool; opening (v,) rad between the margins at the vertex's place
+    upper : (v,) bool; opening (v,) rad between the margins at the vertex's place;
+    missing (v,) rad that a scan with closed eyes lacks to an open eye
     profile : (b,) eyeball radius over the angle from the gaze, `profile_angle` (b,)
     """
 
@@ -99,6 +100,7 @@ class Lids:
     upper: np.ndarray
     hold: np.ndarray
     opening: np.ndarray
+    missing: np.ndarray
     contact_column: np.ndarray
     clearance: np.ndarray
     profile_angle: np.ndarray
