@@ -114,7 +114,7 @@ class HEADSHOP_OT_click_landmarks(bpy.types.Operator):
         count = len(landmarks.positions(self._scan))
         self._area.header_text_set(f"Click {self._name}: {label(self._name)}   ({count} placed)")
         context.workspace.status_text_set(
-            "Click: place   |   N or right click: skip   |   Ctrl Z: take back   |   Esc or Enter: end and keep"
+            f"Click {self._name}   |   N or right click: skip   |   Ctrl Z: take back   |   Esc or Enter: end and keep"
         )
         self._area.tag_redraw()
         return {"RUNNING_MODAL"}

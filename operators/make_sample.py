@@ -11,7 +11,7 @@ class HEADSHOP_OT_make_sample(Job, bpy.types.Operator):
     """Add the sample: an individual made from the reference head, scanned by a virtual scanner, with landmarks"""
 
     bl_idname = "headshop.make_sample"
-    bl_label = "Add Sample Scan"
+    bl_label = "Make Sample"
     bl_options = {"REGISTER", "UNDO"}
     panel = "scan"
 

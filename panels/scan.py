@@ -8,6 +8,9 @@ import bpy
 from ..headshop_addon import active, heads
 from .common import SidebarPanel, hint, needs, progress
 
+#: What cleaning counts that an artist may want to know.
+_FAULTS = ("nonfinite_vertices", "nonfinite_faces", "zero_area_faces", "duplicate_faces")
+
 
 class HEADSHOP_PT_scan(SidebarPanel, bpy.types.Panel):
     """Bring a scan in."""
@@ -24,25 +27,31 @@ class HEADSHOP_PT_scan(SidebarPanel, bpy.types.Panel):
         column = layout.column(align=True)
         column.operator("headshop.import_scan", icon="IMPORT")
         row = column.row(align=True)
-        row.operator("headshop.make_sample", text="Sample", icon="USER")
+        row.operator("headshop.make_sample", icon="USER")
         row.operator("headshop.choose_scan", text="Use Active", icon="RESTRICT_SELECT_OFF")
         scan = active.scan(context)
         if scan is None:
             hint(layout, context, "Start here: import the scan of a head, or add the sample to try things out.")
             return
         layout.prop(settings, "scan", text="")
-        _facts(layout, scan)
+        _facts(layout, context, scan)
 
 
-def _facts(layout, scan):
+def _facts(layout, context, scan):
     facts = json.loads(scan.get(heads.REPORT, "{}")).get("scan", {})
     column = layout.column(align=True)
     column.scale_y = 0.85
     size = max(scan.dimensions) * 1000
     column.label(text=f"{len(scan.data.polygons):,} faces, {size:.0f} mm", icon="MESH_DATA")
-    removed = sum(v for k, v in facts.items() if k.startswith(("removed", "dropped")) and isinstance(v, int))
+    if "unit" in facts:
+        column.label(
+            text=f"Read as {facts['unit']}, {facts['up']} up, facing {facts['front']}", icon="ORIENTATION_GLOBAL"
+        )
+    removed = sum(facts.get(kind, 0) for kind in _FAULTS)
     if removed:
         column.label(text=f"{removed:,} faulty elements removed", icon="BRUSH_DATA")
+    if not facts.get("certain", True):
+        hint(layout, context, "Unsure about unit and axes: look, and import again with your own choice.", "ERROR")
 
 
 def classes():

@@ -119,6 +119,19 @@ def test_landmarks_are_counted_until_a_head_can_be_built(addon, scan, reference)
     assert "Place v" in _text(draw_all(addon), "landmark_list")
 
 
+def test_how_the_file_was_read_is_shown_and_doubt_is_said(addon, scan):
+    import json
+
+    from headshop.headshop_addon import heads
+
+    facts = {"unit": "m", "up": "+Y", "front": "+Z", "certain": True, "zero_area_faces": 7, "duplicate_faces": 2}
+    scan[heads.REPORT] = json.dumps({"scan": facts})
+    text = _text(draw_all(addon), "scan")
+    assert "Read as m, +Y up, facing +Z" in text and "9 faulty" in text and "Unsure" not in text
+    scan[heads.REPORT] = json.dumps({"scan": facts | {"certain": False}})
+    assert "Unsure" in _text(draw_all(addon), "scan")
+
+
 def test_a_head_shows_every_slider_once_and_every_expression(addon, reference):
     from headshop.headshop_addon import heads
     from headshop.sim.acting.expressions import expressions
