@@ -58,7 +58,9 @@ class _Samples:
         weight = 1 / (distance + 1.0) ** 2
         normal = (weight[..., None] * self._normals[near]).sum(axis=1)
         normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-9)
-        return normal, distance[:, 0]
+        # Samples lie some mm apart: the plane through the nearest tells the distance better than the sample itself.
+        height = np.abs(((points - self._tree.data[near[:, 0]]) * self._normals[near[:, 0]]).sum(axis=1))
+        return normal, np.maximum(height, 0.3 * distance[:, 0])
 
 
 def muscle_shape(fibres: np.ndarray, width: float, thickness: float, ring=False, room: Room | None = None) -> Mesh:
