@@ -11,7 +11,7 @@ from ..sim.errors import InputError
 from ..sim.progress import Progress, Work
 from . import heads, shape_keys
 from .outputs import Outputs
-from .pictures import render_picture, write_picture
+from .pictures import grounded, render_picture, write_picture
 from .stage import aim_camera
 from .studio import Model, studio
 from .text_labels import blend, put_text, rounded
@@ -176,7 +176,5 @@ def _card(picture: np.ndarray, strip: int) -> np.ndarray:
     height, width = picture.shape[:2]
     card = np.empty((height + strip, width, 3), dtype=np.float32)
     card[:] = CARD
-    fall = np.clip((np.arange(height) / height - 0.80) / 0.20, 0, 1)
-    fall = (fall * fall * (3 - 2 * fall)).astype(np.float32)[:, None, None]
-    card[:height] = picture + fall * (card[:height] - picture)
+    card[:height] = grounded(picture, CARD)
     return card

@@ -63,3 +63,13 @@ def render_picture(scene) -> np.ndarray:
         with quiet():
             bpy.ops.render.render(write_still=True, scene=scene.name)
         return read_picture(scene.render.filepath)
+
+
+def grounded(picture: np.ndarray, colour) -> np.ndarray:
+    """The picture (h, w, 3 or more) passing into a colour over its lowest fifth, where a neck ends."""
+    height = len(picture)
+    fall = np.clip((np.arange(height) / height - 0.80) / 0.20, 0, 1)
+    fall = (fall * fall * (3 - 2 * fall)).astype(np.float32)[:, None, None]
+    out = picture.copy()
+    out[..., :3] += fall * (np.asarray(colour, dtype=np.float32) - picture[..., :3])
+    return out
