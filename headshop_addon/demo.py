@@ -42,6 +42,10 @@ def run(folder: Path, seed: int | None = None) -> None:
     from ..sim.scan.sample import SEED, make_sample, write_sample
 
     start = time.perf_counter()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{folder} cannot be made ({error.strerror}): choose another folder.") from None
     with _step("scan") as say:
         sample = _finish(make_sample(SEED if seed is None else seed))
         scan_file, landmark_file, _ = write_sample(sample, folder / "sample")
