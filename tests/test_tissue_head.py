@@ -50,7 +50,7 @@ def test_smile_pulls_corners_up_and_back_and_mirrors(model, reference):
     motion = _skin_motion(model, solve(model, control(model, both)))
     left, right = (_at(reference, motion, f"ch_{side}") for side in "lr")
     assert left[2] > 4 and left[0] > 1 and left[1] > 1
-    assert left == pytest.approx(right * [-1, 1, 1], abs=0.3)
+    assert left == pytest.approx(right * [-1, 1, 1], abs=0.1)
 
 
 def test_brows_go_the_right_way(model, reference):
