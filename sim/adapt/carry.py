@@ -67,17 +67,20 @@ def carry(reference: Head, fit: SkinFit) -> Work:
     yield Progress(0.35, "Inner skin")
     between = Between(reference)
     final = fitted.copy()
-    final[inner] = between.warp(parts, fitted).transform(skin.vertices[inner])
+    # The linings of the lips were solved together with the rims; all else inside lies between what surrounds it.
+    rim = rims(reference)
+    lining = np.maximum(group(reference, "lip_upper"), group(reference, "lip_lower")) > 0.3
+    deep = inner & ~lining
+    final[deep] = between.warp(parts, fitted).transform(skin.vertices[deep])
     final = lips_apart(reference, final, inner, size)
     for k, side in enumerate(("l", "r")):
         if side in fit.closed:
-            rim = rims(reference)
             final = lids_apart(reference, rim, final, reference.landmarks.on({"skin": fitted}), size[:, 2], side)
             final = sealed_lids(reference, rim, final, eyes[k], side)
         final = lids_on_eye(reference, final, parts[f"eye_{side}"], eyes[k], k, side, inner)
 
     yield Progress(0.45, "Untangle the skin")
-    shut = np.zeros(len(final), dtype=bool)
+    shut = rim & lining  # where lips meet is seen, a fold behind them is not
     for side in fit.closed:  # closed lids lie too close for the reference's open ones to be restored
         for lid in ("lid_upper", "lid_lower"):
             shut |= group(reference, f"{lid}_{side}") > 0.2

@@ -14,6 +14,7 @@ from .fine_fit import Anchors
 
 TOGETHER = 3.0  # weight of a pair of rim points, against 1 for a point of data
 CLOSED = 0.3  # opening of the lids against the reference's below which an eye counts as closed
+TOUCHING = 3.0  # mm: linings of the lips this close on the reference belong together
 THICK = 1.1  # mm from the margin of a closed lid to its back
 CREASE = 0.15  # mm between the margins of closed lids
 
@@ -60,7 +61,8 @@ def lip_linings(reference: Head, gap: float = 3.0) -> np.ndarray:
 
 
 def lips_apart(reference: Head, skin, inner, matrix) -> np.ndarray:
-    """Skin vertices (n, 3) with the linings of the lips no closer to each other than half as on the reference.
+    """Skin vertices (n, 3) with the linings of the lips about as close to each other as on the reference: at least half
+    as far, and where they touch there, not much farther, or a slit would show the teeth.
 
     matrix (3, 3) turns and scales the reference into the scan's place.
     """
@@ -72,8 +74,10 @@ def lips_apart(reference: Head, skin, inner, matrix) -> np.ndarray:
     length = np.linalg.norm(rest, axis=1)
     way = rest / np.maximum(length, 1e-9)[:, None]
     for _ in range(4):
-        lack = 0.5 * length - np.einsum("ij,ij->i", out[pairs[:, 0]] - out[pairs[:, 1]], way)
-        push = np.maximum(lack, 0)[:, None] * way / 2
+        apart = np.einsum("ij,ij->i", out[pairs[:, 0]] - out[pairs[:, 1]], way)
+        lack = np.maximum(0.5 * length - apart, 0)
+        slack = np.where(length < TOUCHING, np.maximum(apart - 1.2 * length, 0), 0)
+        push = (lack - slack)[:, None] * way / 2
         for rows, sign in ((pairs[:, 0], 1.0), (pairs[:, 1], -1.0)):
             count = np.bincount(rows, minlength=len(out))
             for axis in range(3):
