@@ -58,11 +58,11 @@ def build_head(reference: Head, scan: Mesh, landmarks: dict[str, np.ndarray]) ->
     check_against_scan(given, target)
     check_arrangement(reference.landmark_positions(), given)
     fit = yield from portion(fit_skin(reference, target, given), 0.1, 0.7)
-    report = fit_report(reference, fit, given)
-    refuse_poor(report)
+    refuse_poor(fit_report(reference, fit, given))
     carried = yield from portion(carry(reference, fit), 0.7, 0.95)
     yield Progress(0.95, "Checking the anatomy")
     head = carried.head
+    report = fit_report(reference, fit, given, head.skin.vertices)
     anatomy = anatomy_report(head)
     missing = tuple(n for n in SKIN if n not in given)
     attributes = {
@@ -72,12 +72,15 @@ def build_head(reference: Head, scan: Mesh, landmarks: dict[str, np.ndarray]) ->
     return BuildResult(head, report, anatomy, missing, attributes)
 
 
-def fit_report(reference: Head, fit: SkinFit, given) -> dict:
-    """Distances from the fitted skin to the scan in the face, mm, where there is data; see `BuildResult`."""
+def fit_report(reference: Head, fit: SkinFit, given, vertices=None) -> dict:
+    """Distances from the skin to the scan in the face, mm, where there is data; see `BuildResult`.
+
+    ``vertices`` (n, 3) mm of the skin, if other than those of ``fit``.
+    """
     skin = reference.skin
     face = (group(reference, "face") > 0.5) & (group(reference, "inner") <= 0.5)
     triangles = skin.triangles[face[skin.triangles].all(axis=1)]
-    vertices = fit.fitted.vertices
+    vertices = fit.fitted.vertices if vertices is None else vertices
     corners = vertices[triangles]
     area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     found = fit.target.closest(corners.mean(axis=1), 10.0)
