@@ -15,7 +15,7 @@ from ..sim.progress import finish
 from .progress_bar import progress_bar
 
 #: Small enough for two processor cores and no GPU to finish the demo in minutes.
-SHEET = {"keys": ["joy", "sadness", "anger", "fear", "disgust", "surprise", "smile", "jaw_open"], "samples": 10}
+SHEET = {"keys": ["joy", "sadness", "anger", "fear", "disgust", "surprise", "smile", "jaw_open"], "samples": 8}
 FILM = {"size": (336, 376), "samples": 4}
 
 

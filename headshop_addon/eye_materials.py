@@ -19,6 +19,8 @@ def eye_material(kind: str) -> bpy.types.Material:
     if material is None:
         material = bpy.data.materials.new(name)
         {"sclera": _sclera, "iris": _iris, "pupil": _pupil, "cornea": _cornea}[kind](Graph(material))
+        if kind == "cornea":
+            material.surface_render_method = "BLENDED"  # for Eevee: clear, not grainy
         material.diffuse_color = {
             "sclera": (0.85, 0.82, 0.78, 1.0),
             "iris": (0.20, 0.24, 0.22, 1.0),

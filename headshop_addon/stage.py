@@ -135,7 +135,7 @@ def aim_camera(
     top, bottom = (0.38, -0.77) if close else (0.60, -0.74)
     seen = frame.height * max(top - bottom, 0.95 / aspect)
     distance = seen * LENS_MM / 36.0 + 0.25 * frame.height
-    target = frame.centre + frame.up * (top + bottom) / 2 * frame.height + frame.back * 0.15 * frame.height
+    target = frame.centre + frame.up * (top + bottom) / 2 * frame.height + frame.back * 0.28 * frame.height
     moved = Portrait(target, frame.left, frame.back, frame.up, frame.height)
     camera.matrix_world = _looking(moved.point(yaw, pitch, distance), target, frame.up)
     camera.data.clip_start, camera.data.clip_end = 0.05 * distance, 20 * distance
