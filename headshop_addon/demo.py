@@ -16,7 +16,7 @@ from .progress_bar import progress_bar
 
 #: Small enough for two processor cores and no GPU to finish the demo in minutes.
 SHEET = {"keys": ["joy", "sadness", "anger", "fear", "disgust", "surprise", "smile", "jaw_open"], "samples": 8}
-FILM = {"size": (336, 376), "samples": 4}
+FILM = {"size": (320, 360), "samples": 3}
 
 
 def main(argv: list[str] | None = None) -> int:

@@ -47,7 +47,7 @@ def _write(graph: Graph, image) -> None:
     drawn = graph.node(
         "Mix", {"Factor_Float": lips, "A_Vector": (1.0, 1.0, 1.0), "B_Vector": (1.3, 0.5, 0.3)}, data_type="VECTOR"
     )
-    grain = graph.noise(graph.vector("MULTIPLY", rest, socket(drawn.outputs, "Result_Vector")), 0.85, 2.5, 0.72)
+    grain = graph.noise(graph.vector("MULTIPLY", rest, socket(drawn.outputs, "Result_Vector")), 0.85, 1.5, 0.72)
 
     colour = graph.mix(
         graph.smooth(grain, 0.38, 0.72, 0.0, 0.22), base, graph.mix(1.0, base, (0.90, 0.70, 0.64), "MULTIPLY")
