@@ -3,6 +3,7 @@
 
 import os
 import shutil
+import signal
 import sys
 import tempfile
 from pathlib import Path
@@ -13,7 +14,12 @@ _SETTINGS = pytest.StashKey[str]()
 
 
 def pytest_configure(config):
-    """Blender must not see the user's own settings and extensions: their wheels would shadow this environment's."""
+    """Blender must not see the user's own settings and extensions: their wheels would shadow this environment's.
+
+    A shell that starts the tests in the background has Ctrl-C ignored, and every process under it inherits that.
+    """
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     folder = tempfile.mkdtemp(prefix="headshop-tests-")
     config.stash[_SETTINGS] = folder
     os.environ["BLENDER_USER_RESOURCES"] = folder
