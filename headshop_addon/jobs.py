@@ -41,19 +41,24 @@ def sentence(error: Exception) -> str:
     return str(error)
 
 
+def _reported(operator, act) -> set[str]:
+    """Do ``act()`` and report the sentence it returns, or the one about what is wrong with the input."""
+    try:
+        message = act()
+    except (InputError, OSError) as error:
+        operator.report({"ERROR"}, sentence(error))
+        return {"CANCELLED"}
+    if message:
+        operator.report({"INFO"}, message)
+    return {"FINISHED"}
+
+
 class Simple:
     """Mixin of short operators: write ``act(context)``; input errors become reports."""
 
     def execute(self, context):
         """Run ``act``; report what is wrong with the input."""
-        try:
-            message = self.act(context)
-        except (InputError, OSError) as error:
-            self.report({"ERROR"}, sentence(error))
-            return {"CANCELLED"}
-        if message:
-            self.report({"INFO"}, message)
-        return {"FINISHED"}
+        return _reported(self, lambda: self.act(context))
 
 
 class Job:
@@ -73,14 +78,7 @@ class Job:
 
     def execute(self, context):
         """Run to the end at once, for scripts and Blender without a window."""
-        try:
-            message = self.finish(context, run_to_the_end(self.work(context)))
-        except (InputError, OSError) as error:
-            self.report({"ERROR"}, sentence(error))
-            return {"CANCELLED"}
-        if message:
-            self.report({"INFO"}, message)
-        return {"FINISHED"}
+        return _reported(self, lambda: self.finish(context, run_to_the_end(self.work(context))))
 
     def invoke(self, context, event):
         """Run under a timer."""
@@ -134,14 +132,7 @@ class Job:
 
     def _complete(self, context, result):
         self._end(context)
-        try:
-            message = self.finish(context, result)
-        except (InputError, OSError) as error:
-            self.report({"ERROR"}, sentence(error))
-            return {"CANCELLED"}
-        if message:
-            self.report({"INFO"}, message)
-        return {"FINISHED"}
+        return _reported(self, lambda: self.finish(context, result))
 
     def _fail(self, context, message):
         self._end(context)

@@ -3,31 +3,13 @@
 
 import bpy
 
-from ..headshop_addon import active, polls
-from ..headshop_addon.jobs import Job
+from ..headshop_addon.bake_job import BakeJob
 
 
-class HEADSHOP_OT_bake_muscles(Job, bpy.types.Operator):
+class HEADSHOP_OT_bake_muscles(BakeJob, bpy.types.Operator):
     """Simulate every muscle alone and keep each as a shape key"""
 
     bl_idname = "headshop.bake_muscles"
     bl_label = "Bake Muscles"
     bl_options = {"REGISTER", "UNDO"}
-    panel = "bake"
-
-    @classmethod
-    def poll(cls, context):
-        """Needs a head and the simulation."""
-        return polls.library(cls, "scipy") and polls.head(cls, context) and polls.object_mode(cls, context)
-
-    def work(self, context):
-        """Simulate and write."""
-        from ..headshop_addon.baking import bake
-
-        return (yield from bake(active.skin(context), "muscles"))
-
-    def finish(self, context, result):
-        """Say what came out."""
-        from ..headshop_addon.baking import summary
-
-        return summary(result)
+    poses = "muscles"

@@ -170,3 +170,18 @@ def landmark_array(positions: dict[str, np.ndarray], names=landmark_names.SKIN) 
     """(k, 3) in the order of ``names``; NaN where a landmark is absent."""
     missing = np.full(3, np.nan)
     return np.array([np.asarray(positions.get(name, missing), dtype=float) for name in names])
+
+
+def moved_muscles_and_jaw(head: Head, move) -> tuple[tuple[Muscle, ...], Jaw]:
+    """Muscles and jaw of ``head`` with every point sent through ``move``: (k, 3) mm -> (k, 3) mm, or (3,) -> (3,)."""
+    muscles = tuple(
+        replace(
+            m,
+            fibres=move(m.fibres),
+            centre=None if m.centre is None else move(m.centre),
+            shape=m.shape.moved(move(m.shape.vertices)),
+        )
+        for m in head.muscles
+    )
+    jaw = replace(head.jaw, **{k: move(getattr(head.jaw, k)) for k in ("condyle_l", "condyle_r", "incisor")})
+    return muscles, jaw

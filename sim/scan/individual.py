@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..anatomy.head import Eye, Head
+from ..anatomy.head import Eye, Head, moved_muscles_and_jaw
 
 TABLE = Path(__file__).resolve().parents[2] / "assets" / "tables" / "face_variation.csv"
 
@@ -78,16 +78,7 @@ def individual(reference: Head, rng: np.random.Generator, strength: float = 1.0)
     parts = {name: moved(mesh.vertices) for name, mesh in reference.parts.items()}
     for name, (_, shift) in zip(("eye_l", "eye_r"), balls, strict=True):
         parts[name] = reference.parts[name].vertices + shift
-    muscles = tuple(
-        replace(
-            m,
-            fibres=moved(m.fibres),
-            centre=None if m.centre is None else moved(m.centre),
-            shape=m.shape.moved(moved(m.shape.vertices)),
-        )
-        for m in reference.muscles
-    )
-    jaw = replace(reference.jaw, **{k: moved(getattr(reference.jaw, k)) for k in ("condyle_l", "condyle_r", "incisor")})
+    muscles, jaw = moved_muscles_and_jaw(reference, moved)
     eyes = tuple(Eye(eye.centre + shift, eye.radius, eye.gaze) for eye, shift in balls)
     return replace(reference.with_vertices(parts), muscles=muscles, jaw=jaw, eyes=eyes)
 

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..adapt.triangle_projection import closest_on_triangles
-from ..anatomy.head import Head
+from ..anatomy.head import Head, moved_muscles_and_jaw
 from ..anatomy.storage import load_head, write_atomically
 from ..errors import InputError
 from ..mesh import Mesh, vertex_normals
@@ -174,16 +174,7 @@ def _posed(head: Head, turn, shift) -> Head:
     def move(points):
         return points @ turn.T + shift
 
-    muscles = tuple(
-        replace(
-            m,
-            fibres=move(m.fibres),
-            centre=None if m.centre is None else move(m.centre),
-            shape=m.shape.moved(move(m.shape.vertices)),
-        )
-        for m in head.muscles
-    )
-    jaw = replace(head.jaw, **{k: move(getattr(head.jaw, k)) for k in ("condyle_l", "condyle_r", "incisor")})
+    muscles, jaw = moved_muscles_and_jaw(head, move)
     eyes = tuple(replace(e, centre=move(e.centre), gaze=turn @ e.gaze) for e in head.eyes)
     moved = head.with_vertices({name: move(mesh.vertices) for name, mesh in head.parts.items()})
     return replace(moved, muscles=muscles, jaw=jaw, eyes=eyes)
