@@ -12,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ...sim.anatomy.head import Head
 from ...sim.acting.plain_posing import plainly_posed
+from ...sim.anatomy.head import Head
 from ...sim.anatomy.storage import load_head
 from ...sim.mesh import Mesh, edges
 from ...sim.mesh_subdivision import limit, subdivision
@@ -74,14 +74,16 @@ def part_layer(mesh: Mesh, names: tuple[str, ...], colour=None) -> Layer:
     tint = np.repeat(np.broadcast_to(own, (len(faces), 3)), 4, axis=0)
     index = np.arange(len(faces) * 4).reshape(-1, 4)
     triangles = np.concatenate([index[:, [0, 1, 2]], index[faces[:, 3] >= 0][:, [0, 2, 3]]])
-    return _Split(vertices, triangles, tint, corners.ravel(), mesh)
+    return _coloured(vertices, triangles, tint, corners.ravel(), mesh)
 
 
-def _Split(vertices, triangles, tint, origin, mesh):
+def _coloured(vertices, triangles, tint, origin, mesh):
     """One colour per vertex: the mean over the faces there (split vertices would lose the smooth shading)."""
     n = len(mesh.vertices)
     count = np.bincount(origin, minlength=n)
-    colour = np.stack([np.bincount(origin, tint[:, k], minlength=n) for k in range(3)], 1) / np.maximum(count, 1)[:, None]
+    colour = (
+        np.stack([np.bincount(origin, tint[:, k], minlength=n) for k in range(3)], 1) / np.maximum(count, 1)[:, None]
+    )
     return Layer(mesh.vertices, origin[triangles], colour, gloss=0.25)
 
 
@@ -110,7 +112,7 @@ def bone_layers(head: Head) -> list[Layer]:
 def muscle_layers(head: Head) -> list[Layer]:
     """Every belly in a colour of its own, with its fibres as lines."""
     layers = []
-    for k, m in enumerate(head.muscles):
+    for m in head.muscles:
         base = m.name.removesuffix("_l").removesuffix("_r")
         hue = (sum(map(ord, base)) * 0.618) % 1
         colour = np.array(colorsys.hsv_to_rgb(hue, 0.55, 0.8)) * 0.6 + np.array([0.7, 0.25, 0.2]) * 0.4
@@ -141,9 +143,7 @@ def sheets(head: Head, pixels: int = 420, beside: Mesh | None = None) -> dict:
         "wire": lambda: sheet([wire, *eyes], middle, tall, int(1.4 * pixels)),
         "face": lambda: sheet([skin, *eyes, *mouth], face, 190, int(1.4 * pixels), SIX[:3] + SIX[4:5]),
         "facewire": lambda: sheet([wire, *eyes], face, 170, int(1.8 * pixels), SIX[:2]),
-        "eye": lambda: sheet([wire, *eyes], eye, 50, pixels, ((0, 0), (40, 0), (-30, 10), (80, 0), (20, -40), (10, 40)))
-        if False
-        else montage(
+        "eye": lambda: montage(
             [
                 [draw([s, *eyes], camera(eye, y, p, 50, pixels)) for y, p in ((0, 0), (45, 0), (-35, 5), (10, -35))]
                 for s in (skin, wire)
@@ -169,7 +169,10 @@ def sheets(head: Head, pixels: int = 420, beside: Mesh | None = None) -> dict:
     if beside is not None:
         scan = Layer(beside.vertices, beside.triangles, SKIN if beside.colour is None else beside.colour)
         out["beside"] = lambda: montage(
-            [[draw(layers, camera([0, -10, -20], y, p, 290, pixels)) for y, p in SIX] for layers in ([skin, *eyes], [scan])]
+            [
+                [draw(layers, camera([0, -10, -20], y, p, 290, pixels)) for y, p in SIX]
+                for layers in ([skin, *eyes], [scan])
+            ]
         )
     return out
 

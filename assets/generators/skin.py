@@ -8,6 +8,7 @@ import numpy as np
 from ...sim.anatomy.head import SurfacePoints
 from ...sim.mesh import Mesh
 from .skin_features import feature_mesh
+from .skin_finish import finish_shape
 from .skin_groups import skin_groups
 from .skin_landmarks import skin_landmarks
 from .skin_layout import skin_layout
@@ -28,7 +29,7 @@ class Skin:
 def make_skin(vertices: np.ndarray | None = None) -> Skin:
     """The reference skin; ``vertices`` (n, 3) mm replace the mean shape's (another head on the same layout)."""
     layout = skin_layout()
-    vertices = mean_shape() if vertices is None else vertices
+    vertices = finish_shape(layout, mean_shape()) if vertices is None else vertices
     mesh = Mesh(
         vertices,
         layout.faces,

@@ -3,8 +3,8 @@
 
 The folder holds ``ict/neutral.ply`` and ``neutral.landmarks.json`` (ICT-FaceKit, MIT), ``makehuman/mh_heads.npz``
 (MakeHuman, CC0) and ``scans/lps_infinite.ply`` with landmarks (Lee Perry-Smith, CC-BY). Our own layout is brought onto
-each head; the average after generalised Procrustes (Gower 1975), made symmetric, brought toward adult norms and
-finished, is written to ``assets/tables/mean_head.npz``. Only this step needs the heads.
+each head; the average after generalised Procrustes (Gower 1975), made symmetric and brought toward adult norms,
+is written to ``assets/tables/mean_head.npz``. Only this step needs the heads.
 """
 
 import json
@@ -17,7 +17,7 @@ from ...sim.adapt.thin_plate_spline import similarity
 from ...sim.anatomy.head import SurfacePoints
 from ...sim.mesh import Mesh
 from ...sim.scan.ply import read_ply
-from .skin_finish import finish_shape
+from .skin import make_skin
 from .skin_fit import fit_skin, outer_skin
 from .skin_groups import skin_groups
 from .skin_landmarks import skin_landmarks
@@ -39,7 +39,7 @@ SHARES = {
 }
 
 #: Landmarks decided by touch or measurement: taken from the first head's landmark file and carried along.
-TOUCHED = ("ft", "zy", "go", "t", "or", "os", "sci", "al", "ac", "sbal", "cph", "obs", "obi")
+TOUCHED = ("ft", "zy", "go", "t", "or", "os", "sci", "al", "ac", "cph", "obs", "obi")
 
 #: Landmarks read off the MakeHuman base head by eye, as rays (see `skin_controls`), mm in its own frame.
 _MAKEHUMAN = {
@@ -102,7 +102,7 @@ def _lower_vault(vertices: np.ndarray, floor: float, share: float = 0.92) -> np.
 
 
 def mean_head(folder: Path) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """Vertices (n, 3) mm of the finished mean head and its `TOUCHED` landmarks (left side, mm)."""
+    """Vertices (n, 3) mm of the mean head and its `TOUCHED` landmarks (left side, mm)."""
     layout = skin_layout()
     vertices, triangles, found = _first_head(folder)
     head = MeasuredHead(vertices, triangles)
@@ -132,10 +132,8 @@ def mean_head(folder: Path) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     mean = toward_norms(mean, points)
     mean = _frankfurt(0.5 * (mean + mean[layout.mirror] * [-1, 1, 1]), points)
     at = points.on({"skin": mean})
-    mean = finish_shape(layout, mean)
     seeds = {name: at[name + "_l"] for name in TOUCHED}
     seeds["ft"] = seeds["ft"] + [3, 0, 0]
-    seeds["sbal"] = 0.5 * (mean[layout.grid[15, 2]] + mean[layout.grid[15, 3]])
     return mean, seeds
 
 
@@ -153,9 +151,7 @@ def main(argv: list[str]) -> int:
         seeds=np.array(list(seeds.values()), dtype=np.float32),
         sources=np.array([f"{name}: {share}" for name, share in SHARES.items()]),
     )
-    inner = skin_groups(layout, vertices)["inner"]
-    points = skin_landmarks(layout, vertices, Mesh(vertices, layout.faces).triangles, inner, seeds)
-    at = points.on({"skin": vertices})
+    at = make_skin().landmarks.on({"skin": make_skin().mesh.vertices})
     for norm in norms():
         print(f"{norm.name:28s}{norm.measure(at):8.1f}{norm.mean:8.1f} +- {norm.sd:4.1f}{norm.score(at):7.2f}")
     return 0

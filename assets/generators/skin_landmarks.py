@@ -113,6 +113,7 @@ def skin_landmarks(
     )
     found["pg"] = f.extreme(f.front[22:26], lambda p: -p[:, 1])
     found["gn"] = f.place((0, 25))
+    found["sbal"] = f.near(0.5 * (vertices[layout.grid[15, 2]] + vertices[layout.grid[15, 3]]))
     grid = layout.grid
     found["eu"] = f.extreme(grid[0:7, 12:20].ravel(), lambda p: p[:, 0])
     ear = layout.rings["ear_l"]

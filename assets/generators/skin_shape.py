@@ -22,7 +22,7 @@ def both_sides(left: np.ndarray) -> np.ndarray:
 
 
 def mean_shape() -> np.ndarray:
-    """(n, 3) mm, the vertices of the reference skin."""
+    """(n, 3) mm, the mean of the heads measured; `skin_finish.finish_shape` makes the reference skin of it."""
     with np.load(MEAN_HEAD) as file:
         return both_sides(file["left"].astype(np.float64))
 
