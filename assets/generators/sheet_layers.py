@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a contact sheet draws of a head: `picture.Layer` of skin, parts, bones and muscles."""
+
+import colorsys
+
+import numpy as np
+
+from ...sim.anatomy.head import MATERIALS, Head
+from ...sim.mesh import Mesh, edges
+from ...sim.mesh_subdivision import limit, subdivision
+from .picture import Layer
+
+SKIN, BONE, JAW = np.array([0.84, 0.64, 0.54]), np.array([0.88, 0.84, 0.74]), np.array([0.70, 0.78, 0.88])
+
+#: Colour of each material name (`sim.anatomy.head.MATERIALS`).
+COLOURS = {
+    "enamel": (0.93, 0.91, 0.84),
+    "gum": (0.78, 0.42, 0.42),
+    "tongue": (0.76, 0.38, 0.38),
+    "bone": BONE,
+    "sclera": (0.93, 0.91, 0.89),
+    "iris": (0.36, 0.26, 0.16),
+    "pupil": (0.02, 0.02, 0.02),
+    "cornea": (0.9, 0.95, 1.0),
+    "caruncle": (0.85, 0.5, 0.48),
+}
+
+
+def skin_layer(mesh: Mesh, wire: bool = False, levels: int = 2) -> Layer:
+    """The skin's limit surface, with the edges of the cage drawn on it for ``wire``."""
+    n = len(mesh.vertices)
+    operator, quads, _ = subdivision(mesh.faces, n, levels)
+    smooth = limit(quads, operator.shape[0]) @ (operator @ mesh.vertices)
+    lines = smooth[_cage_lines(mesh.faces, n, levels)] if wire else None
+    return Layer(smooth, Mesh(smooth, quads).triangles, SKIN, lines)
+
+
+def _cage_lines(faces: np.ndarray, n: int, levels: int) -> np.ndarray:
+    """(l, 2) vertex pairs of the subdivided mesh that descend from the cage's edges."""
+    pairs = edges(faces).astype(np.int64)
+    for _ in range(levels):
+        known = edges(faces).astype(np.int64)
+        middle = n + np.searchsorted(known[:, 0] * (n + 1) + known[:, 1], pairs[:, 0] * (n + 1) + pairs[:, 1])
+        operator, faces, _ = subdivision(faces, n, 1)
+        pairs = np.sort(np.concatenate([np.stack([pairs[:, k], middle], axis=1) for k in (0, 1)]), axis=1)
+        n = operator.shape[0]
+    return pairs
+
+
+def part_layer(head: Head, part: str, colour=None) -> Layer:
+    """A part in the colours of its materials, or in one ``colour``; corneas are left out, being clear."""
+    mesh, names = head.parts[part], MATERIALS[part]
+    material = np.zeros(len(mesh.faces), dtype=int) if mesh.material is None else mesh.material
+    keep = np.array([name != "cornea" for name in names])[material]
+    faces = mesh.faces[keep]
+    tint = np.array([COLOURS[name] for name in names], dtype=float)[material[keep]]
+    if colour is None:  # one colour for a vertex, the mean over its faces: split vertices would lose the smooth shading
+        corner = faces >= 0
+        of, n = np.repeat(np.arange(len(faces)), corner.sum(axis=1)), len(mesh.vertices)
+        count = np.maximum(np.bincount(faces[corner], minlength=n), 1)
+        colour = np.stack([np.bincount(faces[corner], tint[of, k], minlength=n) / count for k in range(3)], axis=1)
+    return Layer(mesh.vertices, Mesh(mesh.vertices, faces).triangles, colour, gloss=0.25)
+
+
+def eye_layers(head: Head) -> list[Layer]:
+    """Both eyeballs without their corneas."""
+    return [part_layer(head, f"eye_{side}") for side in "lr"]
+
+
+def mouth_layers(head: Head) -> list[Layer]:
+    """Teeth with gums above and below, and the tongue."""
+    return [part_layer(head, name) for name in ("teeth_upper", "teeth_lower", "tongue")]
+
+
+def bone_layers(head: Head) -> list[Layer]:
+    """Skull and mandible."""
+    return [part_layer(head, "skull", BONE), part_layer(head, "mandible", JAW)]
+
+
+def muscle_layers(head: Head) -> list[Layer]:
+    """Every belly in a colour of its own."""
+    layers = []
+    for muscle in head.muscles:
+        hue = (sum(map(ord, muscle.name.removesuffix("_l").removesuffix("_r"))) * 0.618) % 1
+        colour = np.array(colorsys.hsv_to_rgb(hue, 0.55, 0.8)) * 0.6 + np.array([0.7, 0.25, 0.2]) * 0.4
+        layers.append(Layer(muscle.shape.vertices, muscle.shape.triangles, colour))
+    return layers
