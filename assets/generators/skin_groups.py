@@ -7,6 +7,7 @@ from scipy.sparse.linalg import spsolve
 
 from ...sim.anatomy.head import SKIN_GROUPS
 from ...sim.mesh import edges
+from .skin_jaw import jaw_weights
 from .skin_layout import HALF, ROWS, Layout
 
 
@@ -66,44 +67,10 @@ class _Painter:
         return out
 
 
-#: Jaw weight of the lip by steps from the mouth's corner downward: the opening becomes an oval.
-_LIP_CORNER = (0.5, 0.73, 0.88, 0.97)
-
-
-def _corners(p: _Painter):
-    """Lip and bag vertices near the corners with their jaw weights."""
-    for step, weight in enumerate(_LIP_CORNER):
-        yield p.ring("mouth", 3, 10, (19 - step, 3 + step)), weight
-        yield p.ring("mouth", 3, 10, (19 + step, 3 - step)), 1 - weight
-
-
-def _jaw(p: _Painter) -> np.ndarray:
-    lower, upper = range(7, 16), range(23, 32)
-    return p.field(
-        (p.layout.crown, 0),
-        (p.grid(0, HALF, 0, 9), 0),
-        (p.grid(0, 6, 9, 16), 0),
-        (p.grid(0, HALF, 28, ROWS), 0),
-        (p.grid(16, HALF, 0, ROWS), 0),
-        (p.grid(13, 15, 0, 14), 0),
-        (np.concatenate([p.ring(h + s, 0, None) for h in ("eye", "ear", "nostril") for s in ("_l", "_r")]), 0),
-        (p.ring("mouth", 0, 10, upper), 0),
-        (p.ring("mouth", 0, 0, (*range(22, 33),)), 0),
-        (p.ring("mouth", 1, 10, lower), 1),
-        *_corners(p),
-        (p.grid(0, 6, 22, 25), 1),
-        (p.grid(7, 10, 23, 25), 1),
-        (p.grid(11, 13, 23, 25), 0.8),
-        (p.layout.patches["mouth"][0], 0),
-        (p.layout.patches["mouth"][1], 0.5),
-        (p.layout.patches["mouth"][2], 1),
-    )
-
-
 def skin_groups(layout: Layout, vertices: np.ndarray) -> dict[str, np.ndarray]:
     """Group name (`SKIN_GROUPS`) -> (n,) float32 weights 0..1, mirror-exact."""
     p = _Painter(layout, vertices)
-    out = {"jaw": _jaw(p)}
+    out = {"jaw": jaw_weights(p, vertices)}
     holes = [h + s for h in ("eye", "nostril") for s in ("_l", "_r")]
     front = [p.grid(0, 11, 4, 24), p.ring("mouth", 0, None), *(p.ring(h, 0, None) for h in holes)]
     ears = np.concatenate([p.ring("ear_l", 0, None), p.ring("ear_r", 0, None)])
