@@ -2,7 +2,7 @@
 #   make demo       the main job on the embedded sample: out/demo/head.blend, sheet.png, smile.mp4
 #   make test       all tests
 #   make check      linter and formatter
-#   make assets     regenerate the reference head from its generators
+#   make assets     regenerate the reference head and the muscles' strengths from their generators
 #   make extension  the Blender extension: dist/*.zip, with wheels per platform and one without
 #   make bench      benchmarks: ratios against peers measured in the same run
 # Another Blender: make test BPY=4.5.15 VENV=.venv-4.5     Another Python: make test PYTHON=python3.13 VENV=.venv-3.13
@@ -31,6 +31,7 @@ check: $(READY)
 
 assets: $(READY)
 	$(PY) -m headshop.assets.generators.make_reference_head
+	$(PY) -m headshop.assets.generators.make_strengths
 
 extension: $(READY)
 	$(PY) packaging/build_extension.py
