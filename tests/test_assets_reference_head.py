@@ -1,19 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The reference head as shipped: connectivity, symmetry, landmarks, regions, measurements; it can be remade."""
 
-import os
-
 import numpy as np
 import pytest
 
 from headshop.assets.generators.eye_frame import RADIUS, eye_frames
-from headshop.assets.generators.make_reference_head import main, rounded
+from headshop.assets.generators.make_reference_head import rounded
 from headshop.assets.generators.skin import make_skin
 from headshop.assets.generators.skin_layout import skin_layout
 from headshop.assets.generators.skin_norms import norms
 from headshop.sim.anatomy.head import PARTS, SKIN_GROUPS
 from headshop.sim.anatomy.landmark_names import SKIN, SKULL, mirrored
-from headshop.sim.anatomy.storage import REFERENCE, load_head
+from headshop.sim.anatomy.storage import load_head
 from headshop.sim.mesh import vertex_normals
 from headshop.sim.mesh_subdivision import subdivision
 
@@ -227,9 +225,3 @@ def test_the_skin_is_remade_from_its_tables(head):
     np.testing.assert_array_equal(skin.landmarks.corners, head.landmarks.corners)
     for name, weights in skin.groups.items():
         np.testing.assert_allclose(weights, head.groups[name], atol=1e-6, err_msg=name)
-
-
-@pytest.mark.skipif("HEADSHOP_REBUILD" not in os.environ, reason="takes a minute: set HEADSHOP_REBUILD to run it")
-def test_the_whole_head_is_remade_byte_for_byte(tmp_path):
-    assert main([str(tmp_path / "head.npz")]) == 0
-    assert (tmp_path / "head.npz").read_bytes() == REFERENCE.read_bytes()
