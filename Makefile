@@ -3,6 +3,7 @@
 #   make test       all tests
 #   make check      linter and formatter
 #   make assets     regenerate the reference head and the muscles' strengths from their generators
+#   make sheets     contact sheets of the reference head, out/sheets/*.png
 #   make extension  the Blender extension: dist/*.zip, with wheels per platform and one without
 #   make bench      benchmarks: ratios against peers measured in the same run
 # Another Blender: make test BPY=4.5.15 VENV=.venv-4.5     Another Python: make test PYTHON=python3.13 VENV=.venv-3.13
@@ -17,7 +18,7 @@ endif
 PY := $(VENV)/bin/python
 READY := $(VENV)/.ready
 
-.PHONY: demo test check assets extension bench clean
+.PHONY: demo test check assets sheets extension bench clean
 
 demo: $(READY)
 	$(PY) -m headshop.headshop_addon.demo -o out/demo
@@ -32,6 +33,9 @@ check: $(READY)
 assets: $(READY)
 	$(PY) -m headshop.assets.generators.make_reference_head
 	$(PY) -m headshop.assets.generators.make_strengths
+
+sheets: $(READY)
+	$(PY) -m headshop.assets.generators.sheets out/sheets
 
 extension: $(READY)
 	$(PY) packaging/build_extension.py
