@@ -3,6 +3,7 @@
 
 import numpy as np
 
+from ...sim.mesh_subdivision import limit
 from .skin_curves import even, lerp
 from .skin_layout import Layout
 
@@ -15,6 +16,43 @@ LIP_LINE = [(24.6, -52.7), (19, -51.9), (12, -51.4), (6, -51.7), (0, -52.3)]
 
 #: Depth y of the line by x, mm.
 LIP_DEPTH = ([0, 6, 12, 19, 24.6], [-99.2, -98.9, -96.8, -92.0, -87.2])
+
+# What averaging wore off is given back from here on: sections of adult lips, drawn by hand after norms (vermilion
+# 7.5 and 8.7 mm high, mouth 49 mm wide, philtrum 12.4 mm). Nine numbers go from the corner (0) to the middle (8).
+
+#: mm from the midline of the red border, of the middle of the red, of the lips' edge and of the line where they meet.
+_X3 = (24.5, 21.6, 18.6, 15.5, 12.4, 9.3, 6.1, 2.9, 0)
+_X4 = (24.2, 21.2, 18.2, 15.1, 12.1, 9.0, 6.0, 3.0, 0)
+_X5 = (23.8, 20.8, 17.8, 14.8, 11.8, 8.9, 5.9, 2.95, 0)
+_X6 = (23.4, 20.5, 17.5, 14.6, 11.7, 8.8, 5.85, 2.9, 0)
+
+#: Height of the line where the lips meet, mm against its middle: the tubercle dips between two gentle arches.
+_LINE = (-0.6, -0.1, 0.3, 0.6, 0.8, 0.85, 0.6, 0.15, 0)
+
+#: Height of the red's border over that middle: Cupid's bow above, an even curve below.
+_BOW = (-0.6, 1.5, 3.5, 5.2, 6.8, 8.1, 8.9, 8.2, 7.4)
+_BASE = (-0.6, -2.7, -4.6, -6.3, -7.5, -8.2, -8.6, -8.7, -8.7)
+
+#: Height of the fullest part of the red.
+_FULL_UPPER = (-0.6, 0.7, 1.8, 2.8, 3.6, 4.1, 4.2, 3.7, 3.4)
+_FULL_LOWER = (-0.6, -1.4, -2.3, -3.2, -3.9, -4.4, -4.6, -4.6, -4.6)
+
+#: mm behind the middle of the upper border.
+_BOW_Y = (17.6, 13.6, 9.8, 6.5, 3.8, 1.7, 0.3, -0.2, 0.1)
+_FULL_UPPER_Y = (18.2, 14.2, 10.6, 7.4, 4.7, 2.5, 1.1, 0.4, 0.2)
+_BASE_Y = (17.6, 15.1, 12.3, 9.8, 7.7, 6.1, 5.2, 4.8, 4.7)
+_FULL_LOWER_Y = (18.2, 14.6, 11.3, 8.3, 6.0, 4.4, 3.5, 3.1, 3.0)
+_EDGE_Y = (19.1, 15.2, 11.7, 8.9, 6.8, 5.1, 4.1, 3.6, 3.5)
+_LINE_Y = (20.4, 17.0, 13.7, 10.9, 8.8, 7.1, 6.1, 5.6, 5.5)
+
+#: The lips lie against each other this far back from the line, mm; half the gap between them.
+_CONTACT = (2.2, 2.8, 3.2, 3.6, 3.9, 4.1, 4.2, 4.3, 4.3)
+_GAP = 0.02
+
+#: Philtrum: mm forward (-y) of columns and groove on the two rows of skin above the lip, from the middle sideways;
+#: and where the columns run, mm from the midline.
+_PHILTRUM = {1: (-0.7, -0.25, 0.75, 0.2, 0.0), 2: (-0.8, -0.3, 0.8, 0.25, 0.0)}
+_COLUMN_X = {1: (0, 2.7, 5.4, 9.3, 13.6), 2: (0, 2.8, 5.8, 9.3, 13.0)}
 
 
 def lip_places():
@@ -56,25 +94,49 @@ def place_lips(layout, x, head):
     x[patch[1, 1:-1]] = 0.5 * (x[patch[0, 1:-1]] + x[patch[2, 1:-1]]) + [0, 2, 0]
 
 
-def finish_lips(layout: Layout, x: np.ndarray) -> None:
-    ring = layout.rings["mouth"]
+def _section(x, y, z):
+    """(32, 3) mm against the middle of the line: each coordinate nine numbers, or (above, below) of nine."""
     i, away, above = lip_places()
-    full = np.interp(away, [0, 1, 2, 4, 8], [0, 0.35, 0.7, 1, 1])
-    partner = (38 - i) % 32
-    skin, border, red, edge, meet = (x[ring[k]].copy() for k in (2, 3, 4, 5, 6))
-    line, front = 0.5 * (meet + meet[partner]), 0.5 * (edge + edge[partner])
-    line[:, 1] = lerp(line[:, 1], front[:, 1], 0.9 * full)
-    lower = np.where(above < 0, 1.0, 0.0) * full
-    upper = np.where(above > 0, 1.0, 0.0) * full
-    red += np.stack([0 * full, -1.0 * upper - 1.3 * lower, -0.3 * lower], axis=1)
-    edge[:, 1] = lerp(red[:, 1], line[:, 1], 0.36) - 0.3 * upper - 0.2 * lower
-    edge[:, 2] = line[:, 2] + 0.95 * upper - 1.2 * lower
-    border += np.stack([0 * full, -0.45 * upper - 1.0 * lower, 0.7 * lower], axis=1)
-    skin += np.stack([0 * full, 0.2 * upper - 0.1 * lower, 0.3 * lower], axis=1)
+    side = np.where((i > 11) & (i < 27), 1.0, -1.0) * ((i != 11) & (i != 27))
+    pick = lambda v: (
+        np.where(above > 0, np.asarray(v[0])[away], np.asarray(v[1])[away]) if np.ndim(v) == 2 else np.asarray(v)[away]
+    )  # noqa: E501,E731
+    return np.stack([side * pick(x), pick(y), pick(z)], axis=1)
+
+
+def finish_lips(layout: Layout, x: np.ndarray) -> None:
+    """Rings 1 to 7 of the mouth: the limit surface takes the sections' form, the cage closes where the lips meet."""
+    ring = layout.rings["mouth"]
+    _, away, above = lip_places()
+    old = x[ring[:8]].copy()
+    origin = np.array([0, old[3, 27, 1] - 0.5, 0.5 * (old[6, 27, 2] + old[6, 11, 2])])
+    border = origin + _section(_X3, (_BOW_Y, _BASE_Y), (_BOW, _BASE))
+    red = origin + _section(_X4, (_FULL_UPPER_Y, _FULL_LOWER_Y), (_FULL_UPPER, _FULL_LOWER))
+    edge = origin + _section(_X5, _EDGE_Y, _LINE)
+    meet = origin + _section(_X6, _LINE_Y, _LINE)
+    back = meet * [0.985, 1, 1] + _section(np.zeros(9), _CONTACT, np.zeros(9))
     up = np.zeros((32, 3))
     up[:, 2] = above
-    back = line * [0.985, 1, 1]
-    back[:, 1] += np.interp(away, [0, 2, 8], [1.6, 3.4, 4.6])
-    x[ring[2]], x[ring[3]], x[ring[4]], x[ring[5]] = skin, border, red, edge
-    x[ring[6]] = line + up * np.interp(away, [0, 1, 8], [0, 0.06, 0.07])[:, None]
-    x[ring[7]] = back + up * np.interp(away, [0, 1, 8], [0, 0.08, 0.10])[:, None]
+    rounded = np.interp(away, [0, 1, 3, 8], [0, 0.25, 0.5, 0.6])[:, None]
+    edge += up * rounded - [0, 0, 0.3]
+    meet += up * _GAP
+    back += up * _GAP + [0, 0, 0.25]
+    target = {1: _skin_row(1, old, border, 0.25), 2: _skin_row(2, old, border, 0.6), 3: border, 4: red}
+    for k, place in (*target.items(), (5, edge), (6, meet), (7, back)):
+        x[ring[k]] = place
+    smooth = limit(layout.faces, layout.count)
+    for _ in range(6):
+        now = smooth @ x
+        for k, place in target.items():
+            x[ring[k]] += place - now[ring[k]]
+
+
+def _skin_row(k, old, border, share):
+    """(32, 3) mm: row ``k`` of skin round the lips follows the new border by ``share``; philtrum above the middle."""
+    row = old[k].copy()
+    moved = border - old[3]
+    row += share * moved
+    for step, (forward, column) in enumerate(zip(_PHILTRUM[k], _COLUMN_X[k], strict=True)):
+        for i, sign in {(27 - step) % 32: 1, (27 + step) % 32: -1}.items():
+            row[i] = [sign * column, row[i, 1] - forward, row[i, 2]]
+    return row

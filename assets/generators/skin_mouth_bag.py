@@ -3,22 +3,36 @@
 
 import numpy as np
 
+from .skin_curves import even
 from .skin_layout import Layout
+
+#: Rings of the bag: half outline seen from the front, (x, z) mm from the middle above round the side to the middle
+#: below, z against the line of the lips; and y behind the back of the lips by x. The first turns from the lips' backs
+#: into roof and floor, the second lies at the molars, the third borders the back wall.
+_OUTLINES = {
+    8: [(0, 16.2), (10, 16.0), (18, 14.4), (24.5, 9.5), (27.0, 0), (25.8, -8), (20, -13.8), (10, -15.6), (0, -16.0)],
+    9: [(0, 16.6), (14, 16.4), (25, 14.2), (32, 8.0), (33.0, 0), (32, -8.5), (26, -16.5), (14, -19.5), (0, -20.3)],
+    10: [(0, 13.6), (12, 13.0), (22, 11.0), (28.5, 6.0), (29.5, -1), (28.5, -9), (22, -15), (12, -17), (0, -17.5)],
+}
+_DEPTHS = {
+    8: ([0, 8, 16, 24, 27], [2.2, 3.4, 8.0, 15.5, 17.5]),
+    9: ([0, 12, 24, 33], [25.0, 25.5, 28.0, 32.0]),
+    10: ([0, 30], [49.0, 49.0]),
+}
+#: mm by which the floor's front lies farther back than the roof's: the lower lip is thicker.
+_LOWER_BACK = {8: 4.5, 9: 0.0, 10: 0.0}
 
 
 def mouth_bag(layout: Layout, x: np.ndarray) -> None:
-    """Behind the lips up and down over the teeth, wide past the molars, 43 mm deep."""
+    """Behind the lips up and down over the gums, wide past the molars, 46 mm deep."""
     ring = layout.rings["mouth"]
-    corner, height, front = x[ring[6][19]], x[ring[6][27], 2], x[ring[7][27], 1]
-    angle = (np.arange(32) - 19) * 2 * np.pi / 32
-    c, s = (np.sign(f) * np.abs(f) ** 0.75 for f in (np.cos(angle), np.sin(angle)))
-    wide = corner[0] + 3.0
-    for k, half_width, half_height, down, (at, depth) in (
-        (8, wide, 9.0, 0.3, ([0, 8, 16, wide], [front + 1.2, front + 2.0, front + 6.5, corner[1] + 8.5])),
-        (9, 32.0, 14.5, 0.8, ([0, 10, 20, 32], [front + 13, front + 14, front + 20, front + 32])),
-        (10, 28.5, 12.5, 2.0, ([0, 32], [front + 43, front + 43])),
-    ):
-        across = half_width * c
-        x[ring[k]] = np.stack([across, np.interp(abs(across), at, depth), height - down + half_height * s], axis=1)
+    middle, front = 0.5 * (x[ring[6][27], 2] + x[ring[6][11], 2]), x[ring[7][27], 1]
+    for k, outline in _OUTLINES.items():
+        half = even(outline, 17)  # from the middle above (index 27) to the middle below (11)
+        around = np.zeros((32, 2))
+        for step, place in enumerate(half):
+            around[27 - step], around[(27 + step) % 32] = place, place * [-1, 1]
+        y = front + np.interp(abs(around[:, 0]), *_DEPTHS[k]) + _LOWER_BACK[k] * np.clip(-around[:, 1] / 12, 0, 1)
+        x[ring[k]] = np.stack([around[:, 0], y, middle + around[:, 1]], axis=1)
     patch = layout.patches["mouth"]
     x[patch[1, 1:-1]] = 0.5 * (x[patch[0, 1:-1]] + x[patch[2, 1:-1]]) + [0, 2, 0]
