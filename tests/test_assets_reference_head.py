@@ -12,7 +12,7 @@ from headshop.assets.generators.skin_norms import norms
 from headshop.sim.anatomy.head import PARTS, SKIN_GROUPS
 from headshop.sim.anatomy.landmark_names import SKIN, SKULL, mirrored
 from headshop.sim.anatomy.storage import load_head
-from headshop.sim.mesh import vertex_normals
+from headshop.sim.mesh import edges, vertex_normals
 from headshop.sim.mesh_subdivision import subdivision
 
 
@@ -83,16 +83,27 @@ def test_it_is_complete(head):
     assert len(head.muscles) >= 24
 
 
-def test_skin_is_quads_with_the_neck_as_its_only_edge(head, layout):
+def test_skin_is_quads_with_the_bust_as_its_only_edge(head, layout):
     faces = head.skin.faces
     assert (faces >= 0).all(axis=1).mean() >= 0.97
-    assert 2000 <= len(head.skin.vertices) <= 2800
+    assert 1500 <= len(head.skin.vertices) <= 2500
     pairs = directed_edges(faces)
     assert len(np.unique(pairs, axis=0)) == len(pairs), "an edge is used twice in one direction"
     keys = {tuple(p) for p in pairs.tolist()}
     open_ = {p for p in keys if p[::-1] not in keys}
-    assert {v for p in open_ for v in p} == set(layout.grid[-1].tolist())
+    assert {v for p in open_ for v in p} == set(layout.edge.tolist())
     assert len(np.unique(faces)) == len(head.skin.vertices)
+
+
+def test_poles_are_few_and_none_is_on_lips_lids_or_nose_wings(head, layout):
+    pairs = edges(head.skin.faces)
+    neighbours = np.bincount(pairs.ravel(), minlength=layout.count)
+    inside = np.setdiff1d(np.arange(layout.count), layout.edge)
+    assert set(np.unique(neighbours[inside])) <= {3, 4, 5}
+    assert (neighbours[inside] != 4).mean() < 0.10
+    moving = [layout.rings["mouth"][1:8], layout.rings["eye_l"][1:7], layout.rings["nostril_l"][1:3]]
+    for rings in moving:
+        assert (neighbours[rings] == 4).all()
 
 
 def test_skin_is_its_own_mirror_image(head, layout):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The auricle: eight rings from its root over helix, scapha and antihelix into the concha."""
+"""The auricle: seven rings from its root over helix, scapha and antihelix into the concha."""
 
 import numpy as np
 
@@ -32,8 +32,8 @@ def place_ear(layout, x, head):
     edge = lerp(rim, middle, 0.04)
     x[ring[3]] = head.left(edge)
     for k, flat in (
-        *((4, lerp(rim, fold, 0.28)), (5, lerp(rim, fold, 0.62)), (6, fold)),
-        *((7, lerp(fold, concha, 0.3)), (8, lerp(fold, concha, 0.62))),
+        *((4, lerp(rim, fold, 0.45)), (5, fold)),
+        *((6, lerp(fold, concha, 0.3)), (7, lerp(fold, concha, 0.62))),
     ):
         x[ring[k]] = head.left(flat)
     behind = np.interp(i, [0, 7, 9, 11, 20, 22, 24], [0, 0, 0.5, 1, 1, 0.6, 0.2])
@@ -47,12 +47,11 @@ def place_ear(layout, x, head):
 
 #: Ear ring -> (indices, mm): how far out of the auricle's plane the relief goes.
 _EAR_RELIEF = (
-    (6, [0, 3, 7, 8, 10, 12, 14, 17, 19, 20, 22, 23], [0.3, 0, 0, 1.2, 1.8, 0.6, 1.0, 1.4, 1.8, 1.8, 0.9, 0.5]),
-    (5, [0, 1, 7, 11, 12, 14, 22, 23], [-1.0, 0, 0, 0, -0.7, -1.3, -1.6, -1.2]),
-    (4, [0, 1, 7, 12, 13, 22, 23], [-0.3, 0, 0, 0, -0.5, -0.6, -0.4]),
+    (5, [0, 3, 7, 8, 10, 12, 14, 17, 19, 20, 22, 23], [0.3, 0, 0, 1.2, 1.8, 0.6, 1.0, 1.4, 1.8, 1.8, 0.9, 0.5]),
+    (4, [0, 1, 7, 11, 12, 14, 22, 23], [-0.7, 0, 0, 0, -0.7, -1.0, -1.1, -0.8]),
     (3, [0, 1, 2, 3, 4, 5, 6, 7, 11, 13, 22, 23], [0.2, 0, 0.1, 0.7, 1.2, 0.8, 0.1, 0, 0, 0.5, 0.7, 0.4]),
-    (7, [0, 23], [-0.8, -0.8]),
-    (8, [0, 23], [-2.2, -2.2]),
+    (6, [0, 23], [-0.8, -0.8]),
+    (7, [0, 23], [-2.2, -2.2]),
 )
 
 
@@ -60,7 +59,7 @@ def finish_ear(layout: Layout, x: np.ndarray) -> None:
     """Helix, scapha, antihelix, antitragus, tragus, concha."""
     ring = layout.rings["ear_l"]
     normal = vertex_normals(x, Mesh(x, layout.faces).triangles)
-    out = unit(normal[ring[5:8]].sum(axis=(0, 1)))
+    out = unit(normal[ring[4:7]].sum(axis=(0, 1)))
     out = unit(np.array([out[0], min(out[1], 0), 0.05]))
     for k, at, mm in _EAR_RELIEF:
         x[ring[k]] += np.interp(np.arange(24), at, mm)[:, None] * out

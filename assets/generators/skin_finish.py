@@ -7,7 +7,6 @@ All work in place on (n, 3) mm positions of the left side and the midline; `fini
 import numpy as np
 
 from ...sim.mesh_subdivision import limit
-from .skin_curves import lerp
 from .skin_ear import finish_ear
 from .skin_fit import fair
 from .skin_layout import HALF, ROWS, Layout
@@ -28,32 +27,12 @@ def _smooth_outside(layout: Layout, x: np.ndarray) -> np.ndarray:
                 continue
             weight[vertex] = np.interp(abs(u), [5, 9], [0, 1])
             if abs(u) <= 8:
-                weight[vertex] = max(weight[vertex], 0.6 * (v <= 2 or 26 <= v <= 29))
+                weight[vertex] = max(weight[vertex], 0.6 * (v <= 2 or v >= 26))
     weight[layout.crown] = 1
     for side in ("_l", "_r"):
         weight[layout.rings["ear" + side][0]] = 0.3
-    weight[layout.grid[-1]] = 0
+    weight[layout.edge] = 0
     return fair(layout, x, weight, 7.0)
-
-
-def _neck_edge(layout: Layout, x: np.ndarray) -> None:
-    """The open edge lies in one plane; the rows above it share the way evenly."""
-    first = 26
-    for u in range(HALF + 1):
-        column = layout.grid[first:, u]
-        line = x[column]
-        end = np.concatenate([line, line[-1:] + 4 * (line[-1:] - line[-2:-1])])
-        height = end[:, 2] - np.interp(end[:, 1], [-18, 100], [-139, -114])
-        below = np.flatnonzero(height <= 0)
-        if len(below) == 0 or below[0] == 0:
-            continue
-        k = below[0]
-        cut = lerp(end[k - 1], end[k], height[k - 1] / (height[k - 1] - height[k]))
-        path = np.concatenate([end[:k], cut[None]])
-        length = np.r_[0, np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))]
-        share = np.r_[0, np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))]
-        at = share / share[-1] * length[-1]
-        x[column] = np.stack([np.interp(at, length, path[:, c]) for c in range(3)], axis=1)
 
 
 def _against_rounding(layout: Layout, x: np.ndarray, strength: float = 0.5) -> np.ndarray:
@@ -79,7 +58,6 @@ def _against_rounding(layout: Layout, x: np.ndarray, strength: float = 0.5) -> n
 def finish_shape(layout: Layout, vertices: np.ndarray) -> np.ndarray:
     """(n, 3) mm: an averaged head made whole, exactly symmetric."""
     x = both_sides(_smooth_outside(layout, vertices)[layout.left])
-    _neck_edge(layout, x)
     nose_tip(x, x[layout.grid[12, 0]])
     nostril_rim(layout, x)
     x = both_sides(_against_rounding(layout, both_sides(x[layout.left]))[layout.left])

@@ -8,6 +8,7 @@ from scipy.sparse.linalg import splu
 from ...sim.adapt.closest import Surface
 from ...sim.adapt.thin_plate_spline import ThinPlateSpline
 from ...sim.mesh import Mesh, vertex_normals
+from .skin_bust import NECK_ROW
 from .skin_layout import Layout
 
 
@@ -20,6 +21,8 @@ def outer_skin(layout: Layout, eyes_open: bool = True) -> np.ndarray:
     for side in ("_l", "_r"):
         outer[layout.rings["eye" + side][1:4]] = eyes_open
         outer[layout.rings["ear" + side][0]] = False
+    below = layout.grid[NECK_ROW + 2 :]
+    outer[below[below >= 0]] = False  # shoulders are carried differently by everyone
     return outer
 
 

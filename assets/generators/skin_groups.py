@@ -82,7 +82,7 @@ def skin_groups(layout: Layout, vertices: np.ndarray) -> dict[str, np.ndarray]:
     out["mouth_bag"] = p.patch((p.ring("mouth", 8, None), 1), (p.ring("mouth", 7, 7), 0.5), rounds=0)
     head = np.concatenate([p.layout.crown.ravel(), p.grid(0, HALF, 0, 24), *front, ears])
     out["neck"] = p.field(
-        (p.grid(0, HALF, 0, 20), 0), (p.grid(0, 12, 0, 25), 0), (head, 0), (p.grid(0, HALF, 28, ROWS), 1)
+        (p.grid(0, HALF, 0, 20), 0), (p.grid(0, 12, 0, 25), 0), (head, 0), (p.grid(0, HALF, 30, ROWS), 1)
     )
     skull = [p.layout.crown.ravel(), p.grid(0, HALF, 0, 0), p.grid(14, HALF, 0, 5), p.grid(20, HALF, 0, 17)]
     out["scalp"] = p.field(

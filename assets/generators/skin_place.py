@@ -7,12 +7,13 @@ from scipy.sparse import coo_matrix, diags
 from ...sim.adapt.thin_plate_spline import ThinPlateSpline
 from ...sim.mesh import edges
 from . import skin_controls
-from .skin_layout import CROWN, HALF, ROWS, Layout
+from .skin_bust import NECK_ROW
+from .skin_layout import CROWN, Layout
 from .skin_rays import MeasuredHead
 
 #: Longitude (rad) of columns and height (mm) of rows on a plain egg: where the spline starts from.
 _COLUMNS = ([0, 3, 5, 11, 13, 15, 19, 24], np.radians([0, 8, 17, 42, 65, 88, 118, 180]))
-_ROWS = ([0, 5, 9, 15, 16, 22, 25, 27, ROWS - 1], [100, 37, -2, -31, -36, -70, -92, -105, -150])
+_ROWS = ([0, 5, 9, 15, 16, 22, 25, 27, NECK_ROW], [100, 37, -2, -31, -36, -70, -92, -105, -118])
 _TOP, _RADIUS = 140.0, 90.0
 
 
@@ -24,16 +25,16 @@ def _egg_grid(u, v):
     return np.stack([radius * np.sin(longitude), -radius * np.cos(longitude), height], axis=-1)
 
 
-def _egg_crown():
+def _egg_crown(border):
+    """The crown patch between the columns of its own border, (CROWN + 1, CROWN + 1, 3)."""
     half = CROWN // 2
-    column, row = np.meshgrid(np.arange(CROWN + 1), np.arange(CROWN + 1))
-    x, y = (column - half) / half, (row - half) / half
+    x, y = np.meshgrid(np.linspace(-1, 1, CROWN + 1), np.linspace(-1, 1, CROWN + 1))
     m = np.maximum(np.abs(x), np.abs(y))
     safe = np.maximum(m, 1e-9)
-    side = np.sign(x) * (HALF / 2 + half * y / safe)
-    back = np.where(x < 0, -1, 1) * (HALF - half * np.abs(x) / safe)
-    u = np.where(-y >= np.abs(x), half * x / safe, np.where(y >= np.abs(x), back, side))
-    longitude = np.interp(np.abs(u), *_COLUMNS) * np.sign(u)
+    side = half * (2 + y / safe)
+    back = half * (4 - np.abs(x) / safe)
+    step = np.where(-y >= np.abs(x), half * np.abs(x) / safe, np.where(y >= np.abs(x), back, side))
+    longitude = np.interp(np.interp(step, np.arange(2 * CROWN + 1), border), *_COLUMNS) * np.where(x < 0, -1, 1)
     radius = m * _RADIUS * np.sqrt(1 - (100 / _TOP) ** 2)
     height = _TOP * np.sqrt(1 - (radius / _RADIUS) ** 2)
     return np.stack([radius * np.sin(longitude), -radius * np.cos(longitude), height], axis=-1)
@@ -47,7 +48,7 @@ def _net(layout: Layout, placed: np.ndarray):
     link = coo_matrix(
         (np.ones(2 * len(pairs)), (np.r_[pairs[:, 0], pairs[:, 1]], np.r_[pairs[:, 1], pairs[:, 0]])), shape=(n, n)
     ).tocsr()
-    borders = [rings[0] for rings in layout.rings.values()] + [layout.grid[-1]]
+    borders = [rings[0] for rings in layout.rings.values()] + [layout.row(NECK_ROW)]
     on_border = np.zeros(n, dtype=bool)
     on_border[np.concatenate(borders)] = True
     rows = np.concatenate([np.tile(b, 2) for b in borders])
@@ -59,12 +60,14 @@ def _net(layout: Layout, placed: np.ndarray):
 
 
 def place_grid(layout: Layout, head: MeasuredHead, rounds: int = 10) -> np.ndarray:
-    """(n, 3) mm: grid and crown on the head, symmetric; nan for ring vertices."""
+    """(n, 3) mm: crown and grid down to `NECK_ROW` on the head, symmetric; nan for all others."""
     start = np.full((layout.count, 3), np.nan)
-    v, u = np.nonzero(layout.grid >= 0)
-    signed = np.where(u > HALF, u - 2 * HALF, u)
-    start[layout.crown] = _egg_crown()
-    start[layout.grid[v, u]] = _egg_grid(signed, v)
+    vertex, u, v = layout.places()
+    column = dict(zip(vertex.tolist(), u.tolist(), strict=True))
+    start[layout.crown] = _egg_crown([abs(column[k]) for k in layout.row(0)[: 2 * CROWN + 1].tolist()])
+    above = v <= NECK_ROW
+    start[vertex[above]] = _egg_grid(u[above], v[above])
+    assert all(layout.grid[v, u] >= 0 for u, v in skin_controls.GRID), "a control of a place without a vertex"
     index = [layout.grid[v, u] for u, v in skin_controls.GRID] + [layout.crown[j, i] for i, j in skin_controls.CROWN]
     points = head.controls([*skin_controls.GRID.values(), *skin_controls.CROWN.values()])
     index = np.r_[index, layout.mirror[index]]

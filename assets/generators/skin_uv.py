@@ -39,8 +39,9 @@ def _left_half(layout: Layout, vertices: np.ndarray, faces: np.ndarray) -> np.nd
     cup = CUPS["mouth"]
     front = np.r_[over[middle::-1], layout.grid[1:16, 0], mouth[: cup + 1, 27]]
     below = np.r_[mouth[cup::-1, 11], layout.grid[23:, 0]]
-    neck = layout.grid[-1, : HALF + 1]
-    back = np.r_[layout.grid[:0:-1, HALF], over[:middle:-1], over[middle]]
+    neck = layout.edge[: len(layout.edge) // 2 + 1]
+    spine = layout.grid[:0:-1, HALF]
+    back = np.r_[spine[spine >= 0], over[:middle:-1], over[middle]]
     outline = {}
     for line, start, end in (
         (back, (1, 0), (0, 2)),
