@@ -98,9 +98,12 @@ def _section(x, y, z):
     """(32, 3) mm against the middle of the line: each coordinate nine numbers, or (above, below) of nine."""
     i, away, above = lip_places()
     side = np.where((i > 11) & (i < 27), 1.0, -1.0) * ((i != 11) & (i != 27))
-    pick = lambda v: (
-        np.where(above > 0, np.asarray(v[0])[away], np.asarray(v[1])[away]) if np.ndim(v) == 2 else np.asarray(v)[away]
-    )  # noqa: E501,E731
+    above = above > 0
+
+    def pick(numbers):
+        both = np.broadcast_to(numbers, (2, 9))
+        return np.where(above, both[0][away], both[1][away])
+
     return np.stack([side * pick(x), pick(y), pick(z)], axis=1)
 
 
