@@ -10,6 +10,7 @@ from ...sim.mesh import Mesh, edges
 from ...sim.mesh_subdivision import limit, subdivision
 from .picture import Layer
 
+LIP, LINING = np.array([0.74, 0.40, 0.37]), np.array([0.55, 0.22, 0.21])
 SKIN, BONE, JAW = np.array([0.84, 0.64, 0.54]), np.array([0.88, 0.84, 0.74]), np.array([0.70, 0.78, 0.88])
 
 #: Colour of each material name (`sim.anatomy.head.MATERIALS`).
@@ -26,13 +27,19 @@ COLOURS = {
 }
 
 
-def skin_layer(mesh: Mesh, wire: bool = False, levels: int = 2) -> Layer:
-    """The skin's limit surface, with the edges of the cage drawn on it for ``wire``."""
+def skin_layer(mesh: Mesh, wire: bool = False, levels: int = 2, groups: dict | None = None) -> Layer:
+    """The skin's limit surface, with the edges of the cage drawn on it for ``wire``; lips red where groups are given."""
     n = len(mesh.vertices)
     operator, quads, _ = subdivision(mesh.faces, n, levels)
-    smooth = limit(quads, operator.shape[0]) @ (operator @ mesh.vertices)
+    operator = limit(quads, operator.shape[0]) @ operator
+    smooth = operator @ mesh.vertices
     lines = smooth[_cage_lines(mesh.faces, n, levels)] if wire else None
-    return Layer(smooth, Mesh(smooth, quads).triangles, SKIN, lines)
+    colour = SKIN
+    if groups is not None:
+        lip = np.clip((operator @ np.maximum(groups["lip_upper"], groups["lip_lower"]) - 0.5) / 0.3 + 0.5, 0, 1)
+        colour = SKIN + lip[:, None] * (LIP - SKIN)
+        colour = colour + np.clip(operator @ groups["mouth_bag"], 0, 1)[:, None] * (LINING - colour)
+    return Layer(smooth, Mesh(smooth, quads).triangles, colour, lines)
 
 
 def _cage_lines(faces: np.ndarray, n: int, levels: int) -> np.ndarray:

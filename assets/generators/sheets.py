@@ -45,12 +45,12 @@ class Sheets:
     @cached_property
     def plain(self) -> Layer:
         """The skin's limit surface."""
-        return skin_layer(self.head.skin)
+        return skin_layer(self.head.skin, groups=self.head.groups)
 
     @cached_property
     def wired(self) -> Layer:
         """The same with the edges of the cage."""
-        return skin_layer(self.head.skin, wire=True)
+        return skin_layer(self.head.skin, wire=True, groups=self.head.groups)
 
     def _row(self, layers, target, field, views, larger=1.0):
         pixels = int(larger * self.pixels)
@@ -131,8 +131,18 @@ class Sheets:
         rows = []
         for pose in ({"blink": 1.0}, {"blink": 0.5, "jaw_open": 0.5}, {"jaw_open": 1.0}):
             posed = plainly_posed(self.head, **pose)
-            layers = [skin_layer(posed.skin), *eye_layers(posed), *mouth_layers(posed)]
+            layers = [skin_layer(posed.skin, groups=posed.groups), *eye_layers(posed), *mouth_layers(posed)]
             rows.append(self._row(layers, target, 210, FOUR))
+        return montage(rows)
+
+    def mouth(self):
+        """The mouth opened by the jaw alone, a third, half and wide; pushed aside and forward."""
+        target = self.lip_middle * [0, 1, 1] + [0, 8, -18]
+        rows = []
+        for pose in ({"jaw_open": 0.3}, {"jaw_open": 0.6}, {"jaw_open": 1.0}, {"jaw_side": 1.0}, {"jaw_forward": 1.0}):
+            posed = plainly_posed(self.head, **pose)
+            layers = [skin_layer(posed.skin, groups=posed.groups), *mouth_layers(posed)]
+            rows.append(self._row(layers, target, 110, ((0, 0), (40, 5), (90, 0), (0, -40), (15, 30))))
         return montage(rows)
 
     def beside(self):
@@ -146,7 +156,7 @@ class Sheets:
 
 SHEETS = (
     *("skin", "wire", "face", "facewire", "eye", "ear", "nose", "lips", "skull", "muscles", "rows", "tongue"),
-    *("eyeballs", "poses"),
+    *("eyeballs", "poses", "mouth"),
 )
 
 
