@@ -1,72 +1,117 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The auricle: seven rings from its root over helix, scapha and antihelix into the concha."""
+"""The auricle: a sculpt in its own frame, put on the head along its root and seen on the limit surface."""
 
 import numpy as np
+from scipy.interpolate import CubicSpline, RBFInterpolator
+from scipy.sparse import coo_matrix, diags
+from scipy.sparse.linalg import spsolve
 
-from ...sim.mesh import Mesh, vertex_normals
-from .skin_curves import lerp, unit
-from .skin_layout import Layout
+from ...sim.mesh import edges
+from ...sim.mesh_subdivision import limit
+from .skin_ear_contours import BEFORE, CONTOURS, MIDDLE, ROOT
+from .skin_layout import HALF, Layout
 
-#: Ear rings, 24 vertices from the upper front corner down the front, along the lobe, up the back: (y, z) mm.
-EAR_RIM = [
-    *[(0, 19.5), (-1, 14), (-1.6, 8.5), (-1.2, 3), (-1.2, -3), (-2.6, -8), (-5, -14), (-7, -20), (-7.6, -25.5)],
-    *[(-4, -28.8), (2, -29.3), (8, -26.8), (14, -21.5), (18.5, -16), (21.8, -10), (24, -4), (25.3, 3), (25.4, 9)],
-    *[(24.2, 15), (21.8, 20.3), (18.2, 24.6), (13.5, 27.2), (8, 27.4), (3, 24.4)],
-]
+#: Turn of the auricle (degrees): its back edge away from the head, its top outward, its long axis backward.
+FLARE, LEAN, TILT = 24.0, 6.0, 5.0
 
-EAR_ANTIHELIX = [
-    *[(4, 13), (3.2, 9.5), (2.2, 6), (1.6, 2.5), (1.4, -2), (0.4, -6.5), (-0.6, -10), (-0.4, -12.5), (0.6, -14)],
-    *[(2.5, -14.6), (4.5, -14.6), (7, -13.6), (9.5, -11.6), (12, -9), (14, -6), (15.5, -2.5), (16.3, 1), (16.3, 4.5)],
-    *[(15.5, 8), (14.2, 11), (12.3, 13.5), (10, 15), (7.8, 15.3), (5.6, 14.7)],
-]
+#: How far (mm) the plane of the auricle passes outside the tragion.
+STAND = 5.0
 
-EAR_CONCHA = (6.0, -2.0)
+#: How much of what subdivision rounds off the cage of rings 1.. gives back at each step.
+_CRISP = (0.0, 0.7, 0.8, 0.3, 0.5, 0.0, 0.0)
 
-
-def place_ear(layout, x, head):
-    ring = layout.rings["ear_l"]
-    root = x[ring[0]]
-    i = np.arange(24)
-    rim, fold = np.array(EAR_RIM, float), np.array(EAR_ANTIHELIX, float)
-    concha, middle = np.array(EAR_CONCHA), np.array([8.0, 0.0])
-    edge = lerp(rim, middle, 0.04)
-    x[ring[3]] = head.left(edge)
-    for k, flat in (
-        *((4, lerp(rim, fold, 0.45)), (5, fold)),
-        *((6, lerp(fold, concha, 0.3)), (7, lerp(fold, concha, 0.62))),
-    ):
-        x[ring[k]] = head.left(flat)
-    behind = np.interp(i, [0, 7, 9, 11, 20, 22, 24], [0, 0, 0.5, 1, 1, 0.6, 0.2])
-    base = np.column_stack([root[:, 0] - 0.5, lerp(rim, np.array([3.0, 0.0]), 0.42)])
-    x[ring[1]] = lerp(head.left(lerp(root[:, 1:], rim, 0.55)), base, behind)
-    back = x[ring[3]] + np.column_stack([np.full(24, -4.5), lerp(rim, middle, 0.10) - edge])
-    x[ring[2]] = lerp(head.left(lerp(root[:, 1:], rim, 0.82)), back, behind)
-    patch = layout.patches["ear_l"]
-    x[patch[1:-1, 1]] = 0.5 * (x[patch[1:-1, 0]] + x[patch[1:-1, 2]]) - [1.0, 0, 0]
+#: Grid around the ear that gives way when the root moves: columns and rows.
+_AROUND = (11, HALF, 2, 22)
 
 
-#: Ear ring -> (indices, mm): how far out of the auricle's plane the relief goes.
-_EAR_RELIEF = (
-    (5, [0, 3, 7, 8, 10, 12, 14, 17, 19, 20, 22, 23], [0.3, 0, 0, 1.2, 1.8, 0.6, 1.0, 1.4, 1.8, 1.8, 0.9, 0.5]),
-    (4, [0, 1, 7, 11, 12, 14, 22, 23], [-0.7, 0, 0, 0, -0.7, -1.0, -1.1, -0.8]),
-    (3, [0, 1, 2, 3, 4, 5, 6, 7, 11, 13, 22, 23], [0.2, 0, 0.1, 0.7, 1.2, 0.8, 0.1, 0, 0, 0.5, 0.7, 0.4]),
-    (6, [0, 23], [-0.8, -0.8]),
-    (7, [0, 23], [-2.2, -2.2]),
-)
+def contour(knots: dict[int, tuple], size: int = 24) -> np.ndarray:
+    """(size, d): a closed cubic through ``knots`` index -> point, read at every index."""
+    at = sorted(knots)
+    points = np.array([knots[i] for i in at], float)
+    curve = CubicSpline([*at, at[0] + size], np.concatenate([points, points[:1]]), bc_type="periodic")
+    return curve((np.arange(size) - at[0]) % size + at[0])
+
+
+class _Side:
+    """The head's side without the ear, x = f(y, z) mm, through the grid around the ear (thin-plate spline)."""
+
+    def __init__(self, layout: Layout, x: np.ndarray):
+        u0, u1, v0, v1 = _AROUND
+        block = layout.grid[v0 : v1 + 1, u0 : u1 - 2]
+        points = x[np.unique(block[block >= 0])]
+        self._x = RBFInterpolator(points[:, 1:], points[:, 0], smoothing=2.0)
+
+    def __call__(self, yz: np.ndarray) -> np.ndarray:
+        return np.column_stack([self._x(yz), yz])
+
+
+def _frame(side: _Side) -> tuple[np.ndarray, np.ndarray]:
+    """Origin (3,) mm and rows (3, 3): the directions p, q, h of the ear's frame."""
+    flare, lean, tilt = np.radians([FLARE, LEAN, TILT])
+    out = np.array([np.cos(flare) * np.cos(lean), -np.sin(flare) * np.cos(lean), -np.sin(lean)])
+    back = np.array([np.sin(flare), np.cos(flare), 0.0])
+    up = np.cross(out, back)
+    p, q = np.cos(tilt) * back - np.sin(tilt) * up, np.cos(tilt) * up + np.sin(tilt) * back
+    return side(np.zeros((1, 2)))[0] + [STAND, 0, 0], np.array([p, q, out])
+
+
+def _move_root(layout: Layout, x: np.ndarray, side: _Side) -> None:
+    """Ring 0 goes to the root of the auricle; the grid around it follows evenly, sliding on the head."""
+    root = layout.rings["ear_l"][0]
+    u0, u1, v0, v1 = _AROUND
+    moving = layout.grid[v0 : v1 + 1, u0 : u1 + 1]
+    inner = layout.grid[v0 + 1 : v1, u0 + 1 : u1]
+    moving, inner = np.unique(moving[moving >= 0]), np.unique(inner[inner >= 0])
+    step = np.zeros((layout.count, 2))
+    step[root] = contour(ROOT) - x[root, 1:]
+    pairs = edges(layout.faces)
+    pairs = pairs[np.isin(pairs, moving).all(axis=1)]
+    weight = 1 / np.linalg.norm(x[pairs[:, 0]] - x[pairs[:, 1]], axis=1)
+    ij = (np.r_[pairs[:, 0], pairs[:, 1]], np.r_[pairs[:, 1], pairs[:, 0]])
+    link = coo_matrix((np.r_[weight, weight], ij), shape=(layout.count,) * 2).tocsr()
+    laplacian = diags(np.asarray(link.sum(axis=1)).ravel()) - link
+    free = np.setdiff1d(inner, root)
+    fixed = np.setdiff1d(np.arange(layout.count), free)
+    step[free] = spsolve(laplacian[free][:, free].tocsc(), -laplacian[free][:, fixed] @ step[fixed])
+    old = x[inner, 1:]
+    x[inner] += side(old + step[inner]) - side(old)
+    x[root] = side(contour(ROOT))
+
+
+def _sculpt(layout: Layout, x: np.ndarray, side: _Side) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices (k,) of the auricle and where (k, 3) mm its limit surface has them."""
+    ring, patch = layout.rings["ear_l"], layout.patches["ear_l"]
+    origin, axes = _frame(side)
+    size = ring.shape[1]
+    index, target = [], []
+    for k in range(1, len(ring)):
+        knots = dict(CONTOURS[k])
+        if k == 1:
+            for i, (y, z, high) in BEFORE.items():
+                knots[i] = tuple(axes @ (side(np.array([[y, z]]))[0] + [high, 0, 0] - origin))
+        index.append(ring[k])
+        target.append(origin + contour(knots, size) @ axes)
+    index.append(patch[1:-1, 1])
+    target.append(origin + np.array([MIDDLE[row] for row in sorted(MIDDLE)]) @ axes)
+    return np.concatenate(index), np.concatenate(target)
+
+
+def place_ear(layout: Layout, x: np.ndarray) -> None:
+    """Put the auricle on a head whose grid is placed (left side)."""
+    index, target = _sculpt(layout, x, _Side(layout, x))
+    x[index] = target
 
 
 def finish_ear(layout: Layout, x: np.ndarray) -> None:
-    """Helix, scapha, antihelix, antitragus, tragus, concha."""
+    """The auricle as sculpted, on the limit surface; its root where the sculpt leaves the head (left side)."""
+    side = _Side(layout, x)
+    _move_root(layout, x, side)
+    index, target = _sculpt(layout, x, side)
+    x[index] = target
+    smooth = limit(layout.faces, layout.count)[index]
     ring = layout.rings["ear_l"]
-    normal = vertex_normals(x, Mesh(x, layout.faces).triangles)
-    out = unit(normal[ring[4:7]].sum(axis=(0, 1)))
-    out = unit(np.array([out[0], min(out[1], 0), 0.05]))
-    for k, at, mm in _EAR_RELIEF:
-        x[ring[k]] += np.interp(np.arange(24), at, mm)[:, None] * out
-    x[ring[3][3:6]] += [0.5, 0.6, 0]
-    for k, drop in zip(range(1, 7), (0.8, 1.2, 1.8, 2.6, 1.8, 1.0), strict=True):  # behind the tragus it falls off
-        crest = x[ring[3][k]]
-        x[ring[4][k]] = crest + [-drop, 0.8, -0.1]
-        deep = x[ring[5][k]]
-        x[ring[5][k]] = [min(deep[0], crest[0] - 1.6), max(deep[1], crest[1] + 1.5), deep[2]]
-    x[layout.patches["ear_l"][1:-1, 1]] -= 2.8 * out
+    gain = np.zeros(layout.count)
+    for k, share in enumerate(_CRISP, start=1):
+        gain[ring[k]] = share
+    for _ in range(3):
+        x[index] += gain[index, None] * (target - smooth @ x)

@@ -24,5 +24,5 @@ def place_rings(layout: Layout, grid: np.ndarray, head: MeasuredHead) -> np.ndar
     place_lids(layout, x, head)
     place_lips(layout, x, head)
     place_nostril(layout, x)
-    place_ear(layout, x, head)
+    place_ear(layout, x)
     return both_sides(x[layout.left])
