@@ -9,7 +9,7 @@ from scipy.sparse.linalg import spsolve
 from ...sim.mesh import edges
 from ...sim.mesh_subdivision import limit
 from .skin_ear_contours import BEFORE, CONTOURS, MIDDLE, ROOT
-from .skin_layout import HALF, Layout
+from .skin_layout import Layout
 
 #: Turn of the auricle (degrees): its back edge away from the head, its top outward, its long axis backward.
 FLARE, LEAN, TILT = 24.0, 6.0, 5.0
@@ -20,8 +20,8 @@ STAND = 5.0
 #: How much of what subdivision rounds off the cage of rings 1.. gives back at each step.
 _CRISP = (0.0, 0.7, 0.8, 0.3, 0.5, 0.0, 0.0)
 
-#: Grid around the ear that gives way when the root moves: columns and rows.
-_AROUND = (11, HALF, 2, 22)
+#: Skin around the ear that gives way when the root moves: within so many mm, seen from the side, of (y, z).
+_AROUND, _MIDDLE = 62.0, (9.0, 0.0)
 
 
 def contour(knots: dict[int, tuple], size: int = 24) -> np.ndarray:
@@ -32,13 +32,22 @@ def contour(knots: dict[int, tuple], size: int = 24) -> np.ndarray:
     return curve((np.arange(size) - at[0]) % size + at[0])
 
 
+def _around(layout: Layout, x: np.ndarray) -> np.ndarray:
+    """Vertices of the head's left side around the ear, its root included."""
+    inside = np.zeros(layout.count, dtype=bool)
+    for rings in layout.rings.values():
+        inside[rings[1:]] = True
+    for patch in layout.patches.values():
+        inside[patch] = True
+    near = np.linalg.norm(x[:, 1:] - _MIDDLE, axis=1) < _AROUND
+    return np.flatnonzero(near & (x[:, 0] > 20) & ~inside)
+
+
 class _Side:
-    """The head's side without the ear, x = f(y, z) mm, through the grid around the ear (thin-plate spline)."""
+    """The head's side without the ear, x = f(y, z) mm, through the skin around the ear (thin-plate spline)."""
 
     def __init__(self, layout: Layout, x: np.ndarray):
-        u0, u1, v0, v1 = _AROUND
-        block = layout.grid[v0 : v1 + 1, u0 : u1 - 2]
-        points = x[np.unique(block[block >= 0])]
+        points = x[_around(layout, x)]
         self._x = RBFInterpolator(points[:, 1:], points[:, 0], smoothing=2.0)
 
     def __call__(self, yz: np.ndarray) -> np.ndarray:
@@ -56,16 +65,13 @@ def _frame(side: _Side) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _move_root(layout: Layout, x: np.ndarray, side: _Side) -> None:
-    """Ring 0 goes to the root of the auricle; the grid around it follows evenly, sliding on the head."""
+    """Ring 0 goes to the root of the auricle; the skin around it follows evenly, sliding on the head."""
     root = layout.rings["ear_l"][0]
-    u0, u1, v0, v1 = _AROUND
-    moving = layout.grid[v0 : v1 + 1, u0 : u1 + 1]
-    inner = layout.grid[v0 + 1 : v1, u0 + 1 : u1]
-    moving, inner = np.unique(moving[moving >= 0]), np.unique(inner[inner >= 0])
+    inner = _around(layout, x)
     step = np.zeros((layout.count, 2))
     step[root] = contour(ROOT) - x[root, 1:]
     pairs = edges(layout.faces)
-    pairs = pairs[np.isin(pairs, moving).all(axis=1)]
+    pairs = pairs[np.isin(pairs, inner).any(axis=1)]
     weight = 1 / np.linalg.norm(x[pairs[:, 0]] - x[pairs[:, 1]], axis=1)
     ij = (np.r_[pairs[:, 0], pairs[:, 1]], np.r_[pairs[:, 1], pairs[:, 0]])
     link = coo_matrix((np.r_[weight, weight], ij), shape=(layout.count,) * 2).tocsr()

@@ -120,7 +120,7 @@ def skin_landmarks(
     found["sa"] = f.extreme(ear[1:5].ravel(), lambda p: p[:, 2])
     found["sba"] = f.extreme(ear[1:5].ravel(), lambda p: -p[:, 2])
     found["pa"] = f.extreme(ear[1:5].ravel(), lambda p: p[:, 1])
-    found["pra"] = f.extreme(ear[3, 0:5], lambda p: -p[:, 1])
+    found["pra"] = f.extreme(ear[2, 0:3], lambda p: -p[:, 1])
     corners, weights = [], []
     for name in SKIN:
         base, side = (name[:-2], name[-1]) if name[-2:] in ("_l", "_r") else (name, "")
