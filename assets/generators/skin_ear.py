@@ -14,6 +14,9 @@ from .skin_layout import Layout
 #: Turn of the auricle (degrees): its back edge away from the head, its top outward, its long axis backward.
 FLARE, LEAN, TILT = 24.0, 6.0, 5.0
 
+#: The contours' scale: what is seen, the limit surface, and the cage outside it then both have the length of the norms.
+SIZE = 0.975
+
 #: How far (mm) the plane of the auricle passes outside the tragion.
 STAND = 5.0
 
@@ -55,13 +58,13 @@ class _Side:
 
 
 def _frame(side: _Side) -> tuple[np.ndarray, np.ndarray]:
-    """Origin (3,) mm and rows (3, 3): the directions p, q, h of the ear's frame."""
+    """Origin (3,) mm and rows (3, 3): the steps along p, q, h of the ear's frame."""
     flare, lean, tilt = np.radians([FLARE, LEAN, TILT])
     out = np.array([np.cos(flare) * np.cos(lean), -np.sin(flare) * np.cos(lean), -np.sin(lean)])
     back = np.array([np.sin(flare), np.cos(flare), 0.0])
     up = np.cross(out, back)
     p, q = np.cos(tilt) * back - np.sin(tilt) * up, np.cos(tilt) * up + np.sin(tilt) * back
-    return side(np.zeros((1, 2)))[0] + [STAND, 0, 0], np.array([p, q, out])
+    return side(np.zeros((1, 2)))[0] + [STAND, 0, 0], SIZE * np.array([p, q, out])
 
 
 def _move_root(layout: Layout, x: np.ndarray, side: _Side) -> None:
@@ -94,7 +97,7 @@ def _sculpt(layout: Layout, x: np.ndarray, side: _Side) -> tuple[np.ndarray, np.
         knots = dict(CONTOURS[k])
         if k == 1:
             for i, (y, z, high) in BEFORE.items():
-                knots[i] = tuple(axes @ (side(np.array([[y, z]]))[0] + [high, 0, 0] - origin))
+                knots[i] = tuple(axes @ (side(np.array([[y, z]]))[0] + [high, 0, 0] - origin) / SIZE**2)
         index.append(ring[k])
         target.append(origin + contour(knots, size) @ axes)
     index.append(patch[1:-1, 1])
