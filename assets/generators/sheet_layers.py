@@ -36,7 +36,7 @@ def skin_layer(mesh: Mesh, wire: bool = False, levels: int = 2, groups: dict | N
     lines = smooth[_cage_lines(mesh.faces, n, levels)] if wire else None
     colour = SKIN
     if groups is not None:
-        lip = np.clip((operator @ np.maximum(groups["lip_upper"], groups["lip_lower"]) - 0.5) / 0.3 + 0.5, 0, 1)
+        lip = np.clip((operator @ np.maximum(groups["lip_upper"], groups["lip_lower"]) - 0.7) / 0.25 + 0.5, 0, 1)
         colour = SKIN + lip[:, None] * (LIP - SKIN)
         colour = colour + np.clip(operator @ groups["mouth_bag"], 0, 1)[:, None] * (LINING - colour)
     return Layer(smooth, Mesh(smooth, quads).triangles, colour, lines)

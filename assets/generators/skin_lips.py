@@ -38,21 +38,27 @@ _FULL_UPPER = (-0.6, 0.7, 1.8, 2.8, 3.6, 4.1, 4.2, 3.7, 3.4)
 _FULL_LOWER = (-0.6, -1.4, -2.3, -3.2, -3.9, -4.4, -4.6, -4.6, -4.6)
 
 #: mm behind the middle of the upper border.
-_BOW_Y = (17.6, 13.6, 9.8, 6.5, 3.8, 1.7, 0.3, -0.2, 0.1)
-_FULL_UPPER_Y = (18.2, 14.2, 10.6, 7.4, 4.7, 2.5, 1.1, 0.4, 0.2)
-_BASE_Y = (17.6, 15.1, 12.3, 9.8, 7.7, 6.1, 5.2, 4.8, 4.7)
-_FULL_LOWER_Y = (18.2, 14.6, 11.3, 8.3, 6.0, 4.4, 3.5, 3.1, 3.0)
-_EDGE_Y = (19.1, 15.2, 11.7, 8.9, 6.8, 5.1, 4.1, 3.6, 3.5)
-_LINE_Y = (20.4, 17.0, 13.7, 10.9, 8.8, 7.1, 6.1, 5.6, 5.5)
+_BOW_Y = (18.3, 13.6, 9.8, 6.5, 3.8, 1.7, 0.3, -0.2, 0.1)
+_FULL_UPPER_Y = (19.1, 14.2, 10.6, 7.4, 4.7, 2.5, 1.1, 0.4, 0.2)
+_BASE_Y = (18.3, 15.1, 12.3, 9.8, 7.7, 6.1, 5.2, 4.8, 4.7)
+_FULL_LOWER_Y = (19.1, 14.6, 11.3, 8.3, 6.0, 4.4, 3.5, 3.1, 3.0)
+_EDGE_Y = (20.0, 15.2, 11.7, 8.9, 6.8, 5.1, 4.1, 3.6, 3.5)
+_LINE_Y = (21.3, 17.0, 13.7, 10.9, 8.8, 7.1, 6.1, 5.6, 5.5)
 
 #: The lips lie against each other this far back from the line, mm; half the gap between them.
 _CONTACT = (2.2, 2.8, 3.2, 3.6, 3.9, 4.1, 4.2, 4.3, 4.3)
 _GAP = 0.02
 
-#: Philtrum: mm forward (-y) of columns and groove on the two rows of skin above the lip, from the middle sideways;
-#: and where the columns run, mm from the midline.
-_PHILTRUM = {1: (-0.7, -0.25, 0.75, 0.2, 0.0), 2: (-0.8, -0.3, 0.8, 0.25, 0.0)}
-_COLUMN_X = {1: (0, 2.7, 5.4, 9.3, 13.6), 2: (0, 2.8, 5.8, 9.3, 13.0)}
+#: Philtrum on the two rows of skin above the lip, from the middle sideways, groove to column to cheek: mm from the
+#: midline, mm behind the middle of the upper border, and how far these numbers rule over what was measured.
+_PHILTRUM = {
+    1: ((0, 2.7, 5.5, 9.2), (3.0, 2.7, 1.9, 2.6), (1, 1, 1, 0.5)),
+    2: ((0, 2.8, 5.9, 9.2), (1.5, 1.2, 0.6, 1.9), (1, 1, 1, 0.6)),
+}
+
+#: mm between the red's border and the next row of skin, as a share of what was measured: near, for a crisp border; and
+#: how much of the border's way the row beyond it follows.
+_NEAR, _FOLLOW = 0.68, 0.25
 
 
 def lip_places():
@@ -124,7 +130,9 @@ def finish_lips(layout: Layout, x: np.ndarray) -> None:
     edge += up * rounded - [0, 0, 0.3]
     meet += up * _GAP
     back += up * _GAP + [0, 0, 0.25]
-    target = {1: _skin_row(1, old, border, 0.25), 2: _skin_row(2, old, border, 0.6), 3: border, 4: red}
+    near = border + _NEAR * (old[2] - old[3])
+    beyond = old[1] + _FOLLOW * (border - old[3])
+    target = {1: _with_philtrum(1, beyond, origin), 2: _with_philtrum(2, near, origin), 3: border, 4: red}
     for k, place in (*target.items(), (5, edge), (6, meet), (7, back)):
         x[ring[k]] = place
     smooth = limit(layout.faces, layout.count)
@@ -134,12 +142,10 @@ def finish_lips(layout: Layout, x: np.ndarray) -> None:
             x[ring[k]] += place - now[ring[k]]
 
 
-def _skin_row(k, old, border, share):
-    """(32, 3) mm: row ``k`` of skin round the lips follows the new border by ``share``; philtrum above the middle."""
-    row = old[k].copy()
-    moved = border - old[3]
-    row += share * moved
-    for step, (forward, column) in enumerate(zip(_PHILTRUM[k], _COLUMN_X[k], strict=True)):
-        for i, sign in {(27 - step) % 32: 1, (27 + step) % 32: -1}.items():
-            row[i] = [sign * column, row[i, 1] - forward, row[i, 2]]
+def _with_philtrum(k, row, origin):
+    """(32, 3) mm: row ``k`` of skin round the lips with groove and columns above the middle."""
+    row = row.copy()
+    for step, (aside, behind, rule) in enumerate(zip(*_PHILTRUM[k], strict=True)):
+        for i, sign in ((27 - step) % 32, 1), ((27 + step) % 32, -1):
+            row[i] = lerp(row[i], np.array([sign * aside, origin[1] + behind, row[i, 2]]), rule)
     return row
