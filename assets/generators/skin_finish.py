@@ -13,7 +13,7 @@ from .skin_layout import HALF, ROWS, Layout
 from .skin_lids import finish_lids
 from .skin_lips import finish_lips
 from .skin_mouth_bag import mouth_bag
-from .skin_nose import finish_nostril, nose_tip, nostril_rim
+from .skin_nose import finish_nose
 from .skin_shape import both_sides
 
 
@@ -58,11 +58,9 @@ def _against_rounding(layout: Layout, x: np.ndarray, strength: float = 0.5) -> n
 def finish_shape(layout: Layout, vertices: np.ndarray) -> np.ndarray:
     """(n, 3) mm: an averaged head made whole, exactly symmetric."""
     x = both_sides(_smooth_outside(layout, vertices)[layout.left])
-    nose_tip(x, x[layout.grid[12, 0]])
-    nostril_rim(layout, x)
     x = both_sides(_against_rounding(layout, both_sides(x[layout.left]))[layout.left])
     finish_ear(layout, x)
-    finish_nostril(layout, x)
+    finish_nose(layout, x)
     finish_lids(layout, x)
     finish_lips(layout, x)
     mouth_bag(layout, x)
