@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The eye's four materials. They read the attribute ``headshop_eye`` (`dress` in `materials.py` writes it): across the
+"""The eye's materials. All but the caruncle's read the attribute ``headshop_eye`` (`dress` in `materials.py` writes it): across the
 gaze, in iris radii, with the radius of the pupil as the third number, so they turn with the eye."""
 
 import bpy
@@ -13,12 +13,13 @@ IRIS_COLOUR = (0.12, 0.135, 0.105)
 
 
 def eye_material(kind: str) -> bpy.types.Material:
-    """The material ``sclera``, ``iris``, ``pupil`` or ``cornea``, made if the file has none."""
+    """The material ``sclera``, ``iris``, ``pupil``, ``cornea`` or ``caruncle``, made if the file has none."""
     name = "Head Shop " + kind.title()
     material = bpy.data.materials.get(name)
     if material is None:
         material = bpy.data.materials.new(name)
-        {"sclera": _sclera, "iris": _iris, "pupil": _pupil, "cornea": _cornea}[kind](Graph(material))
+        make = {"sclera": _sclera, "iris": _iris, "pupil": _pupil, "cornea": _cornea, "caruncle": _caruncle}
+        make[kind](Graph(material))
         if kind == "cornea":
             material.surface_render_method = "BLENDED"  # for Eevee: clear, not grainy
         material.diffuse_color = {
@@ -26,6 +27,7 @@ def eye_material(kind: str) -> bpy.types.Material:
             "iris": (0.20, 0.24, 0.22, 1.0),
             "pupil": (0.0, 0.0, 0.0, 1.0),
             "cornea": (1.0, 1.0, 1.0, 0.05),
+            "caruncle": (0.68, 0.36, 0.33, 1.0),
         }[kind]
     return material
 
@@ -101,6 +103,25 @@ def _iris(graph: Graph) -> None:
 def _pupil(graph: Graph) -> None:
     inputs = {"Base Color": (0.002, 0.002, 0.002, 1.0), "Roughness": 1.0, "Specular IOR Level": 0.0}
     graph.surface(graph.node("BsdfPrincipled", inputs).outputs[0])
+
+
+def _caruncle(graph: Graph) -> None:
+    """Wet pink flesh."""
+    shader = graph.node(
+        "BsdfPrincipled",
+        {
+            "Base Color": (0.56, 0.22, 0.19, 1.0),
+            "Roughness": 0.4,
+            "Subsurface Weight": 0.6,
+            "Subsurface Radius": (1.0, 0.35, 0.25),
+            "Subsurface Scale": 0.0012,
+            "Coat Weight": 0.8,
+            "Coat Roughness": 0.1,
+            "Coat IOR": 1.34,
+        },
+        subsurface_method="BURLEY",
+    )
+    graph.surface(shader.outputs[0])
 
 
 def _cornea(graph: Graph) -> None:

@@ -17,7 +17,7 @@ from .scan_colour import ScanColour, colour_image, iris_colour
 from .skin_material import COLOUR, skin_material
 from .skin_paint import paint_skin, write_vectors
 
-_EYE_KINDS = ("sclera", "iris", "pupil", "cornea")
+_EYE_KINDS = ("sclera", "iris", "pupil", "cornea", "caruncle")
 
 
 def dress_head(skin: bpy.types.Object) -> None:

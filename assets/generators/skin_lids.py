@@ -3,7 +3,9 @@
 
 import numpy as np
 
-from .eye_frame import GAP, RADIUS
+from ...sim.anatomy.eyeball import reach
+from ...sim.mesh_subdivision import limit
+from .eye_frame import BALL, GAP, RADIUS
 from .skin_curves import even, lerp, unit
 from .skin_layout import Layout
 
@@ -42,82 +44,154 @@ def place_lids(layout, x, head):
     x[patch[1, 1:-1]] = 0.5 * (x[patch[0, 1:-1]] + x[patch[2, 1:-1]]) + [0, 3, 0]
 
 
+#: Visible edge of the lids at rest in mm from the eye's centre, (to the side, up): inner corner first. The upper lid
+#: covers 1.5 mm of the iris, the lower touches it (oculoplastic texts); MRD1 and MRD2 as in Malik et al. 2022.
+UPPER_EDGE = [(-14.4, -2.3), (-12.3, -0.5), (-8.8, 2.3), (-4.6, 4.1), (-0.6, 4.5), (4.0, 3.9), (8.0, 2.2), (12.3, -0.6)]
+LOWER_EDGE = [
+    (-14.4, -2.3),
+    (-12.0, -3.1),
+    (-8.6, -4.2),
+    (-3.6, -5.5),
+    (1.2, -5.9),
+    (6.0, -5.2),
+    (9.6, -3.3),
+    (12.3, -0.6),
+]
+
+#: The lining turns back this far above and below the edges, degrees about the eye.
+FORNIX = 34
+
+#: Thickness of the lids at their edge, mm.
+THICKNESS = 1.7
+
+
+def _column(count=24):
+    """Steps from the inner corner 0..12, the same from the outer corner, and which columns are the upper lid's."""
+    i = np.arange(count)
+    inner = np.minimum((i - 2) % count, (2 - i) % count)
+    return inner, 12 - inner, (i >= 15) | (i <= 1)
+
+
 def finish_lids(layout: Layout, x: np.ndarray) -> None:
+    """Lids that lie on an eyeball behind the averaged ones: margin, tarsal plate, crease and fold, and the cup behind.
+
+    The profiles are those of the limit surface: the cage goes farther where subdivision will round it off.
+    """
     ring = layout.rings["eye_l"]
-    i = np.arange(24)
-    inner, outer = np.minimum((i - 2) % 24, (2 - i) % 24), np.minimum((i - 14) % 24, (14 - i) % 24)
-    above = (i >= 15) | (i <= 1)
-    margin = x[ring[6]].copy()
-    share = np.clip((margin[:, 0] - margin[2, 0]) / (margin[14, 0] - margin[2, 0]), 0, 1)
-    chord = margin[2, 2] + share * (margin[14, 2] - margin[2, 2])
+    centre = _eye_centre(x[ring[6]])
+    inner, outer, above = _column()
+    goal = {0: x[ring[0]] - centre, 1: x[ring[1]] - centre}
+    goal[6], goal[5] = _margins(inner, outer, above)
+    goal[4], goal[3], goal[2] = _lid_skin(goal[5], goal[1], inner, outer, above)
+    goal[7], goal[8], back = _cup(goal[6], inner, outer, above)
+    for k in range(2, 9):
+        x[ring[k]] = goal[k] + centre
+    patch = layout.patches["eye_l"]
+    x[patch[1, 1:-1]] = back + centre
+    smooth = limit(layout.faces, layout.count)
+    front, on_ball = ring[2:7].ravel(), ring[6][inner >= 2]
+    want = np.concatenate([goal[k] for k in range(2, 7)]) + centre
+    firm = np.repeat([0.5, 0.8, 0.8, 0.9, 0.9], 24)[:, None]
+    rows = smooth[front]
+    behind = np.unique(np.concatenate([ring[7], ring[8], patch[1, 1:-1]]))
+    lining = smooth[behind]
+    for _ in range(24):
+        x[front] += firm * (want - rows @ x) + 0.08 * (want - x[front])
+        x[on_ball] = _clear(x[on_ball] - centre, 0.16, 0.46) + centre
+        away = lining @ x - centre
+        x[behind] += _clear(away, 0.7, np.inf) - away
+
+
+def _clear(points: np.ndarray, least: float, most: float) -> np.ndarray:
+    """Points (k, 3) mm about the eye's centre, ``least`` to ``most`` mm in front of its surface."""
+    far = np.linalg.norm(points, axis=1)
+    surface = reach(BALL, np.arccos(np.clip(-points[:, 1] / far, -1, 1)))
+    return points * (np.clip(far, surface + least, surface + most) / far)[:, None]
+
+
+def _eye_centre(margin: np.ndarray) -> np.ndarray:
+    """Centre (3,) mm of the ball on which the averaged margin (24, 3) lies best."""
+    inner, outer, _ = _column()
     height = margin[8, 2] - LOWER_MARGIN
-    stretch = (height + UPPER_MARGIN - chord[20]) / (margin[20, 2] - chord[20])
-    margin[above, 2] = (chord + (margin[:, 2] - chord) * stretch)[above]
     central = (inner >= 4) & (outer >= 3)
     flat = margin[central][:, [0, 2]] - [HALF_PUPILS, height]
     depth = np.mean(margin[central, 1] + np.sqrt((RADIUS + GAP) ** 2 - (flat**2).sum(axis=1)))
-    centre = np.array([HALF_PUPILS, depth, height])
+    return np.array([HALF_PUPILS, depth, height])
 
-    # inner edge: on the ball, except at the corners
-    room = (RADIUS + GAP) ** 2 - ((margin[:, [0, 2]] - centre[[0, 2]]) ** 2).sum(axis=1)
-    touch = np.clip(np.minimum((inner - 0.5) / 1.5, outer), 0, 1) * (room > 6)
-    margin[:, 1] = lerp(margin[:, 1], centre[1] - np.sqrt(np.maximum(room, 0)), touch)
-    margin[14] = [centre[0] + 13.1, centre[1] - 1.2, margin[14, 2]]
-    margin[2] = [centre[0] - 14.3, centre[1] - 8.4, margin[2, 2]]
-    for k in (13, 15):
-        margin[k, 0] = min(margin[k, 0], centre[0] + 11.9)
-        left = (RADIUS + GAP) ** 2 - ((margin[k, [0, 2]] - centre[[0, 2]]) ** 2).sum()
-        margin[k, 1] = centre[1] - np.sqrt(max(left, 1.0))
-    for k, beside in ((1, 0), (3, 4)):
-        margin[k] = lerp(margin[2], margin[beside], 0.42)
-    away = margin - centre
-    margin = centre + away * np.maximum(1, (RADIUS + GAP) / np.linalg.norm(away, axis=1, keepdims=True))
-    x[ring[6]] = margin
 
-    # outer edge: the lid's thickness in front of it
-    forward = unit(0.75 * unit(margin - centre) + [0, -0.55, 0])
-    thick = np.interp(np.minimum(inner, outer), [0, 1, 2, 3], [0.9, 1.3, 1.6, 1.7])
-    edge = margin + forward * thick[:, None] + 0.25 * unit((margin - margin.mean(axis=0)) * [1, 0, 1])
-    edge[2] = margin[2] + [-1.0, -0.5, 0]
-    edge[14] = margin[14] + [1.2, -0.3, 0]
-    x[ring[5]] = edge
+def _margins(inner, outer, above):
+    """Inner and outer edge (24, 3) of the margins about the eye's centre."""
+    edge = np.zeros((24, 3))
+    for k, (low, up) in enumerate(zip(even(LOWER_EDGE, 13), even(UPPER_EDGE, 13), strict=True)):
+        edge[(2 + k) % 24, [0, 2]] = low
+        edge[(2 - k) % 24, [0, 2]] = up
+    across = np.linalg.norm(edge, axis=1)
+    depth = np.full(24, RADIUS)
+    for _ in range(8):  # on the globe, and on the cornea where the upper lid covers it
+        room = (reach(BALL, np.arctan2(across, depth)) + GAP) ** 2 - across**2
+        depth = np.sqrt(np.maximum(room, 1.5))
+    # the inner corner leaves the ball and makes room for the caruncle
+    lake = np.array([-8.4, -7.6, -6.6])
+    edge[:, 1] = np.where(inner < 3, np.append(lake, np.zeros(10))[inner], -depth)
+    edge[14, [0, 1]] = 12.1, -2.2
+    flat = unit(edge)
+    forward = np.where(above[:, None], unit(flat * [1, 1, 0.35]), unit(flat * [1, 1, 0.9]))
+    thick = np.interp(np.minimum(inner, outer), [0, 1, 2, 3], [0.5, 1.1, 1.5, THICKNESS])
+    rim = edge + forward * thick[:, None]
+    rim[2] = edge[2] + [-1.0, -0.4, 0]
+    rim[14] = edge[14] + [1.2, 0.1, 0]
+    return edge, rim
 
-    # lid plate, crease and fold lie on arcs about the eye from the edge to the orbit
-    orbit = x[ring[1]].copy()
-    start, end = unit(edge - centre), unit(orbit - centre)
-    angle = np.arccos(np.clip((start * end).sum(axis=1), -1, 1))
-    old = [x[ring[k]].copy() for k in (4, 3, 2)]
-    place = [np.arccos(np.clip((unit(p - centre) * start).sum(axis=1), -1, 1)) / angle for p in old]
-    place = np.stack([np.zeros(24), *place, np.ones(24)], axis=1)
-    radius = np.stack([np.linalg.norm(p - centre, axis=1) for p in (edge, *old, orbit)], axis=1)
-    open_ = np.clip((np.minimum(inner, outer) - 0.3) / 2.0, 0, 1)
-    straight = np.clip((np.minimum(inner, 1.4 * outer) - 0.2) / 2.2, 0, 1)
 
-    def on_arc(upper_mm, lower_mm, most):
-        t = np.clip(np.where(above, upper_mm, lower_mm) / (14.5 * angle), 0, most)
-        a, b = np.sin((1 - t) * angle) / np.sin(angle), np.sin(t * angle) / np.sin(angle)
-        direction = a[:, None] * start + b[:, None] * end
-        return direction, np.array([np.interp(t[k], place[k], radius[k]) for k in range(24)])
+def _lid_skin(rim, orbit, inner, outer, above):
+    """Tarsal plate, crease and fold of the upper lid; plate, roll and groove of the lower one: (24, 3) each."""
+    start = np.arctan2(rim[:, 2], -rim[:, 1])
 
-    plate, r4 = on_arc(2.5, 2.2, 0.25)
-    crease, r3 = on_arc(5.2, 5.0, 0.45)
-    fold, r2 = on_arc(7.4, 8.0, 0.66)
-    r4 = lerp(r4, np.full(24, RADIUS + 2.0), 0.8 * open_)
-    r3 = lerp(r3, np.where(above, RADIUS + 2.25, RADIUS + 2.7), np.where(above, 0.75, 0.5) * open_)
-    r2 = np.maximum(r2, RADIUS + 2.6) + open_ * np.where(above, 0.7, 0.25)
-    for k, direction, distance, t in ((4, plate, r4, 0.18), (3, crease, r3, 0.38), (2, fold, r2, 0.64)):
-        x[ring[k]] = lerp(lerp(edge, orbit, t), centre + direction * distance[:, None], straight)
+    def over(length, height, share):
+        """``length`` mm from the edge and ``height`` mm over the ball, going ``share`` of the way to the orbit sideways."""
+        side = lerp(rim[:, 0], orbit[:, 0], share)
+        angle = start + np.where(above, 1, -1) * length / (RADIUS + 2)
+        depth = np.sqrt(np.maximum((RADIUS + height) ** 2 - side**2, 4))
+        depth = np.maximum(depth, np.hypot(rim[:, 1], rim[:, 2]) + height - THICKNESS)  # the corners leave the ball
+        return np.stack([side, -depth * np.cos(angle), depth * np.sin(angle)], axis=1)
 
-    # back of the lids: a cup around the eyeball
+    def table(up, low):
+        knots = [0, 1, 2, 4, 6, 8, 10, 11, 12]
+        return np.where(above, np.interp(inner, knots, up), np.interp(inner, knots, low))
+
+    plate = over(table([1] * 9, [1] * 9), np.full(24, 2.0), np.full(24, 0.06))
+    crease = over(
+        table([1.6, 2.2, 2.7, 3.4, 3.7, 3.6, 2.9, 2.2, 1.6], [2.5, 2.8, 3.3, 3.8, 4.0, 4.0, 3.7, 3.2, 2.5]),
+        table([2.4] * 9, [2.45] * 9),
+        np.full(24, 0.22),
+    )
+    fold = over(
+        table([2, 2.3, 2.6, 2.9, 3.0, 2.9, 2.8, 2.8, 2.6], [4.5, 5, 5.8, 6.8, 7.1, 7.1, 6.6, 5.8, 5]),
+        table([3.2, 3.6, 4.2, 4.6, 4.7, 4.7, 4.3, 3.8, 3.2], [2.8, 3, 3.2, 3.5, 3.5, 3.5, 3.4, 3.2, 3]),
+        np.full(24, 0.42),
+    )
+    straight = np.clip((np.minimum(inner * np.where(above, 1, 0.7), 1.4 * outer) - 0.2) / 2.2, 0, 1)
+    out = []
+    for shape, share in ((plate, 0.16), (crease, 0.38), (fold, 0.62)):
+        out.append(lerp(lerp(rim, orbit, share), shape, straight))
+    return out
+
+
+def _cup(edge, inner, outer, above):
+    """Fornix and cup (24, 3) each and the row (9, 3) that closes the cup, clear of the ball."""
+    side = 1.05 * edge[:, 0]
+    ramp = np.clip(np.minimum(inner, outer) / 2, 0, 1)
+    angle = np.arctan2(edge[:, 2], -edge[:, 1]) + np.radians(FORNIX) * np.where(above, 1, -1) * ramp
+    depth = np.sqrt(np.maximum((RADIUS + 2.0) ** 2 - side**2, 16))
+    lining = np.stack([side, -depth * np.cos(angle), depth * np.sin(angle)], axis=1)
+    corner = np.where((inner < outer)[:, None], [-14.2, -3.6, -2.0], [13.2, 1.0, -0.6])
+    lining = lerp(corner, lining, ramp)
+    i = np.arange(24)
     around = np.pi + (i - 2) * 2 * np.pi / 24
-    for k, degrees in ((7, 80), (8, 128)):
-        a = np.radians(degrees)
-        circle = np.stack([np.sin(a) * np.cos(around), np.full(24, -np.cos(a)), np.sin(a) * np.sin(around)], axis=1)
-        x[ring[k]] = centre + (RADIUS + 0.8) * circle
-    for k, t in ((2, 0.55), (1, 0.4), (3, 0.4)):
-        x[ring[7][k]] = lerp(x[ring[7][k]], margin[k] + [0.8, 1.6, 0], t)
-    x[ring[7][14]] = lerp(x[ring[7][14]], margin[14] + [0, 1.5, 0], 0.6)
-    for k in (13, 15):
-        x[ring[7][k]] = centre + unit(unit(margin[k] - centre) + [0, 0.35, 0]) * (RADIUS + 0.9)
-    patch = layout.patches["eye_l"]
-    x[patch[1, 1:-1]] = 0.5 * (x[patch[0, 1:-1]] + x[patch[2, 1:-1]]) + [0, 4.0, 0]
+    circle = np.stack([np.cos(around), np.zeros(24), np.sin(around)], axis=1)
+    a = np.radians(100)
+    cup = 15.2 * (np.sin(a) * circle + np.cos(a) * np.array([0, -1, 0]))
+    turn = np.radians(np.linspace(-100, -260, 11)[1:-1])
+    back = np.linspace(0, np.pi, 11)[1:-1]
+    back = (15.2 + 4.0 * np.sin(back))[:, None] * np.stack([np.sin(turn), -np.cos(turn), np.zeros(9)], axis=1)
+    return lining, cup, back

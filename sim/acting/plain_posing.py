@@ -7,6 +7,7 @@ It shows whether weights, lips and lids are fit to move before any simulation is
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from ..anatomy.eyeball import turned_eye
 from ..anatomy.head import JAW_PARTS, Head
 from ..tissue.jaw import jaw_transform
 from ..tissue.layers import build_layers
@@ -47,5 +48,5 @@ def plainly_posed(
     around = gaze_rotation(gaze)
     for eye, side in zip(head.eyes, "lr", strict=True):
         part = f"eye_{side}"
-        vertices[part] = (vertices[part] - eye.centre) @ around.T + eye.centre
+        vertices[part] = turned_eye(vertices[part], eye.centre, around)
     return head.with_vertices({**vertices, "skin": skin})

@@ -206,14 +206,14 @@ def lids_on_eye(reference: Head, skin, ball, eye, k: int, side: str, inner):
     old = reference.eyes[k]
     lid = np.maximum(group(reference, f"lid_upper_{side}"), group(reference, f"lid_lower_{side}"))
     rest = reference.skin.vertices - old.centre
-    height = np.linalg.norm(rest, axis=1) - eyeballs.profile_of(reference.parts[f"eye_{side}"].vertices, old)(
+    height = np.linalg.norm(rest, axis=1) - eyeballs.profile_of(old)(
         angle_from(rest, old.gaze)
     )
     rows = np.flatnonzero((lid > 0.05) & (height < 0.4 * old.radius) & (rest @ old.gaze > 0))
     if len(rows) == 0:
         return skin
     gap = np.where(inner[rows], np.clip(height[rows], 0.02, 0.1), np.clip(height[rows], 0.05, 0.5))
-    return eyeballs.lids_over(skin, eye, eyeballs.profile_of(ball, eye), rows, gap)
+    return eyeballs.lids_over(skin, eye, eyeballs.profile_of(eye), rows, gap)
 
 
 def angle_from(vectors, direction):

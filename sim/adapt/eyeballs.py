@@ -3,6 +3,7 @@
 
 import numpy as np
 
+from ..anatomy.eyeball import reach
 from ..anatomy.head import Eye
 from .thin_plate_spline import similarity
 
@@ -67,11 +68,6 @@ def lids_over(skin, eye: Eye, profile, rows, gap) -> np.ndarray:
     return out
 
 
-def profile_of(vertices, eye: Eye):
+def profile_of(eye: Eye):
     """Callable: angle from the gaze (rad) -> how far the eyeball reaches there (mm); the cornea stands out."""
-    away = vertices - eye.centre
-    length = np.linalg.norm(away, axis=1)
-    angle = np.arccos(np.clip(away @ eye.gaze / np.maximum(length, 1e-9), -1, 1))
-    grid = np.linspace(0, np.pi, 61)
-    reach = np.array([max([eye.radius, *length[np.abs(angle - g) < 0.08]]) for g in grid])
-    return lambda a: np.interp(a, grid, reach)
+    return lambda angle: reach(eye, angle)

@@ -22,8 +22,8 @@ MATERIALS = {
     "skin": ("skin",),
     "skull": ("bone",),
     "mandible": ("bone",),
-    "eye_l": ("sclera", "iris", "pupil", "cornea"),
-    "eye_r": ("sclera", "iris", "pupil", "cornea"),
+    "eye_l": ("sclera", "iris", "pupil", "cornea", "caruncle"),
+    "eye_r": ("sclera", "iris", "pupil", "cornea", "caruncle"),
     "teeth_upper": ("enamel", "gum"),
     "teeth_lower": ("enamel", "gum"),
     "tongue": ("tongue",),
@@ -109,13 +109,27 @@ class Jaw:
     forward_max: float = 7.0
 
 
+#: Radius of limbus and pupil by the globe's: 11.7 mm (Rüfer 2005) and 3.8 mm across in a globe of 24 mm.
+IRIS_SHARE, PUPIL_SHARE = 5.85 / 12, 1.9 / 12
+
+
 @dataclass(frozen=True, eq=False)
 class Eye:
-    """An eyeball: centre (3,) mm, radius mm, gaze (3,) unit vector of the rest gaze."""
+    """An eyeball: centre (3,) mm, radius mm, gaze (3,) unit vector of the rest gaze.
+
+    iris_radius, pupil_radius : mm; 0: in proportion to the globe (see `eyeball.eye_of_size` for others)
+    """
 
     centre: np.ndarray
     radius: float
     gaze: np.ndarray
+    iris_radius: float = 0.0
+    pupil_radius: float = 0.0
+
+    def __post_init__(self):
+        for name, share in (("iris_radius", IRIS_SHARE), ("pupil_radius", PUPIL_SHARE)):
+            if not getattr(self, name):
+                object.__setattr__(self, name, share * self.radius)
 
 
 @dataclass(frozen=True, eq=False)

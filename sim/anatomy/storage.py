@@ -77,7 +77,16 @@ def anatomy_document(head: Head) -> dict:
             for m in head.muscles
         ],
         "jaw": {k: v if np.isscalar(v) else _numbers(v) for k, v in vars(head.jaw).items()},
-        "eyes": [{"centre": _numbers(e.centre), "radius": e.radius, "gaze": _numbers(e.gaze, 7)} for e in head.eyes],
+        "eyes": [
+            {
+                "centre": _numbers(e.centre),
+                "radius": e.radius,
+                "gaze": _numbers(e.gaze, 7),
+                "iris_radius": round(e.iris_radius, 4),
+                "pupil_radius": round(e.pupil_radius, 4),
+            }
+            for e in head.eyes
+        ],
     }
 
 
@@ -110,7 +119,16 @@ def head_from_document(parts: dict[str, Mesh], groups: dict[str, np.ndarray], do
         for m in document["muscles"]
     )
     jaw = Jaw(**{k: np.array(v, dtype=float) if isinstance(v, list) else v for k, v in document["jaw"].items()})
-    eyes = tuple(Eye(np.array(e["centre"], float), e["radius"], np.array(e["gaze"], float)) for e in document["eyes"])
+    eyes = tuple(
+        Eye(
+            np.array(e["centre"], float),
+            e["radius"],
+            np.array(e["gaze"], float),
+            e.get("iris_radius", 0.0),
+            e.get("pupil_radius", 0.0),
+        )
+        for e in document["eyes"]
+    )
     return Head(
         parts=parts,
         groups=groups,

@@ -3,36 +3,35 @@
 about the axis from the inner to the outer corner. At closure 1 both margins meet on one line, most of the way down.
 """
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
+from ..anatomy.eyeball import reach
 from ..anatomy.head import Eye, Head
 from ..mesh import edges
+from ..mesh_subdivision import limit, subdivision
 from .layers import Layers
 from .structures import Lids
 
 #: Share of the opening that the lower lid covers in a blink (the upper lid does the rest).
 LOWER_SHARE = 0.12
-#: Closed lids press on each other: rad beyond the first touch, against the rounding of their edges.
-_SEAL = 0.012
+#: Closed lids press on each other, mm beyond the first touch of their limit surfaces.
+_SEAL = 0.04
+#: Share of a vertical gaze that the lids follow: (upper lid down, up; lower lid down, up).
+_FOLLOW = (0.75, 0.6, 0.3, 0.12)
+#: mm between skin and eyeball where the lid is taut.
+_TAUT = 2.6
 #: rad between the margins of an open eye (11 mm on a ball of 12 mm), and how much of it a full levator restores to an
 #: eye that was scanned closed, per share by which it widens an open one.
 _OPEN, _WAKE = 0.9, 3.2
 
 
-def eye_profile(vertices: np.ndarray, eye: Eye) -> tuple[np.ndarray, np.ndarray]:
+def eye_profile(eye: Eye) -> tuple[np.ndarray, np.ndarray]:
     """Angle from the gaze (b,) rad and eyeball radius (b,) mm there: the cornea stands out of the sphere."""
-    rel = vertices - eye.centre
-    radius = np.linalg.norm(rel, axis=1)
-    angle = np.arccos(np.clip(rel @ eye.gaze / np.maximum(radius, 1e-9), -1, 1))
-    grid = np.linspace(0, np.pi, 64)
-    out = np.full(len(grid), eye.radius)
-    step = grid[1]
-    for k, g in enumerate(grid):
-        near = np.abs(angle - g) < 1.2 * step
-        if near.any():
-            out[k] = max(eye.radius, radius[near].max())
-    return grid, np.minimum(out, 1.25 * eye.radius)
+    grid = np.linspace(0, np.pi, 181)
+    return grid, reach(eye, grid)
 
 
 def _margin(along, elevation, corners):
@@ -66,45 +65,56 @@ def build_lids(head: Head, layers: Layers, side: str) -> Lids | None:
     up = np.cross(forward, axis)
     if up[2] < 0:
         up = -up
+    frame = np.stack([axis, forward, up])
 
     def place(p):
-        rel = p - eye.centre
-        f, u = rel @ forward, rel @ up
-        return rel @ axis, np.arctan2(u, f), np.hypot(u, f)
+        a, f, u = np.moveaxis((p - eye.centre) @ frame.T, -1, 0)
+        return a, np.arctan2(u, f), np.hypot(u, f)
 
     along, elevation, radius = place(v[column])
     upper = upper_group[column] >= lower_group[column]
-    inner = np.asarray(head.groups.get("inner", np.zeros(len(v))), float)[column] > 0.5
-    (a0, e0, _), (a1, e1, _) = place(en), place(ex)
-    corners = (a0, e0), (a1, e1)
-    # the margin is where the outer lid ends and its back begins
     back = np.asarray(head.groups.get("inner", np.zeros(len(v)))) > 0.5
+    inner = back[column]
+    # the margin is where the outer lid ends and its back begins
     pair = edges(head.skin.faces)
     turn = np.unique(np.concatenate([pair[back[pair[:, 1]], 0], pair[back[pair[:, 0]], 1]]))
-    edge = np.isin(column, turn) & ~inner & (share[column] > 0.5)
+    edge = np.isin(column, turn) & ~inner & (share[column] > 0.4)
+    surface = _Edge(head, column, edge, inner, frame, eye.centre)
+    root = _roots(pair, column, surface.rows, len(v))
+    at, level = surface.reach(v, upper)
+    if len(at) >= 8:
+        first, last = at.argmin(), at.argmax()
+        corners = (at[first], level[first]), (at[last], level[last])
+        along_margin = np.where(root >= 0, at[root], along)
+    else:
+        corners = tuple(place(p)[:2] for p in (en, ex))
+        along_margin = along
+    (a0, _), (a1, _) = corners
     curves = []
     for is_upper, name in ((True, "ps"), (False, "pi")):
-        rows = edge & (upper == is_upper)
+        rows = upper[surface.rows] == is_upper
         if rows.sum() >= 3:
-            curves.append(_margin(along[rows], elevation[rows], corners))
+            curves.append(_margin(at[rows], level[rows], corners))
         else:
             middle = place(marks[f"{name}_{side}"])
             curves.append(_margin(np.array([middle[0]]), np.array([middle[1]]), corners))
-    within = np.clip(along, a0, a1)
+    within = np.clip(along_margin, a0, a1)
     opening = np.clip(curves[0](within) - curves[1](within), 0, 1.4)
     across = np.clip((2 * within - a0 - a1) / (a1 - a0), -1, 1)
     missing = np.clip(_OPEN * (1 - across**2) - opening, 0, None) * float(opening.max() < 0.5 * _OPEN)
     # weight: 1 at the margin, 0 where the lid's own group ends; the groups are taken as drawn, scaled to reach 1
     weight = np.clip(share[column] / max(np.percentile(share[column], 90), 1e-3), 0, 1)
     off = np.abs(elevation - np.where(upper, curves[0](within), curves[1](within)))
-    weight = np.maximum(weight, np.clip(1.4 - off / 0.25, 0, 1) * ((along > a0) & (along < a1)))
-    profile_angle, profile = eye_profile(head.parts[f"eye_{side}"].vertices, eye)
+    weight = np.maximum(weight, np.clip(1.4 - off / 0.25, 0, 1) * ((within > a0) & (within < a1)))
+    # the lining unfolds from the fornix as the lid goes
+    weight = np.where(inner, weight * np.clip(1.0 - 0.7 * off, 0.3, 1), weight)
+    profile_angle, profile = eye_profile(eye)
     distance = np.linalg.norm(v - eye.centre, axis=1)
     touching = np.flatnonzero((distance < 1.6 * eye.radius) & layers.free[: len(v)])
     rel = v[touching] - eye.centre
     angle = np.arccos(np.clip(rel @ eye.gaze / np.maximum(distance[touching], 1e-9), -1, 1))
     clearance = np.minimum(distance[touching] - np.interp(angle, profile_angle, profile), 0.15)
-    return Lids(
+    lids = Lids(
         side=side,
         eye=eye,
         column=column,
@@ -116,14 +126,94 @@ def build_lids(head: Head, layers: Layers, side: str) -> Lids | None:
         elevation=elevation,
         radius=radius,
         upper=upper,
+        inner=inner,
         hold=weight**2 * np.where(inner, 0.5, 1.0),
         opening=opening,
         missing=missing,
+        seal=np.zeros(len(column)),
         contact_column=touching,
         clearance=clearance,
         profile_angle=profile_angle,
         profile=profile,
     )
+    if opening.max() <= 0 or len(surface.rows) < 8:
+        return lids
+    return replace(lids, seal=_seal(lids, head, surface, within))
+
+
+def _roots(pair, column, start, count) -> np.ndarray:
+    """(v,) for each lid vertex the entry of ``start`` (rows on the margin) whose strip across the lid it belongs to."""
+    row = np.full(count, -1)
+    row[column] = np.arange(len(column))
+    ends = row[pair]
+    ends = ends[(ends >= 0).all(axis=1)]
+    ends = np.concatenate([ends, ends[:, ::-1]])
+    root = np.full(len(column), -1)
+    root[start] = np.arange(len(start))
+    for _ in range(8):
+        step = ends[(root[ends[:, 0]] >= 0) & (root[ends[:, 1]] < 0)]
+        if not len(step):
+            break
+        root[step[::-1, 1]] = root[step[::-1, 0]]
+    return root
+
+
+class _Edge:
+    """How far the edges of the lids reach on the limit surface: subdivision rounds them off.
+
+    rows : (k,) rows of the lids' columns on the margin, each with its neighbour on the outer skin
+    """
+
+    def __init__(self, head: Head, column, edge, inner, frame, centre):
+        faces = head.skin.faces
+        near = np.zeros(len(head.skin.vertices), dtype=bool)
+        near[column] = True
+        for _ in range(2):
+            near[faces[near[faces].any(axis=1)].ravel()] = True
+        faces = faces[(near[faces] | (faces < 0)).all(axis=1)]
+        self.used = np.unique(faces[faces >= 0])
+        faces = np.where(faces >= 0, np.searchsorted(self.used, faces), -1)
+        fine, quads, _ = subdivision(faces, len(self.used))
+        local = np.searchsorted(self.used, column)
+        row = np.full(len(self.used), -1)
+        row[local] = np.arange(len(column))
+        pairs = edges(faces)
+        ends = row[pairs]
+        outer = np.append(~edge & ~inner, False)
+        found = [(np.append(edge, False)[ends[:, k]] & outer[ends[:, 1 - k]]) for k in (0, 1)]
+        spots = np.concatenate([np.flatnonzero(f) for f in found])
+        first = np.concatenate([pairs[f, k] for k, f in enumerate(found)])
+        second = np.concatenate([pairs[f, 1 - k] for k, f in enumerate(found)])
+        self.rows = row[first]
+        points = np.concatenate([first, len(self.used) + spots, second])
+        self.smooth = limit(quads, fine.shape[0])[points] @ fine
+        self.frame, self.centre = frame, centre
+
+    def reach(self, vertices, upper):
+        """(k,) mm along the lid and (k,) rad: the lowest of an upper, the highest of a lower edge."""
+        a, f, u = ((self.smooth @ vertices[self.used] - self.centre) @ self.frame.T).T.reshape(3, 3, -1)
+        angle = np.arctan2(u, f)
+        best = np.where(upper[self.rows], angle.argmin(axis=0), angle.argmax(axis=0))[None]
+        return np.take_along_axis(a, best, 0)[0], np.take_along_axis(angle, best, 0)[0]
+
+
+def _seal(lids: Lids, head: Head, surface: _Edge, within) -> np.ndarray:
+    """(v,) rad that each vertex turns on when closed, so that the limit surfaces just meet."""
+    fade = lids.opening > 0.02
+    upper = lids.upper[surface.rows]
+    seal = np.zeros(len(lids.column))
+    for _ in range(8):
+        shut = head.skin.vertices.copy()
+        shut[lids.column] = lid_targets(replace(lids, seal=seal), 1.0, 1.0, np.zeros(2))
+        at, level = surface.reach(shut, lids.upper)
+        gap = _along(at[upper], level[upper], within) - _along(at[~upper], level[~upper], within)
+        seal = np.clip(seal + 0.4 * fade * (gap + _SEAL / lids.eye.radius), -0.2, 0.2)
+    return seal
+
+
+def _along(x, y, at):
+    order = np.argsort(x, kind="stable")
+    return np.interp(at, x[order], y[order])
 
 
 def gaze_direction(eye: Eye, gaze: np.ndarray) -> np.ndarray:
@@ -152,34 +242,37 @@ def eyeball_radius(lids: Lids, points: np.ndarray, gaze: np.ndarray) -> np.ndarr
 def lid_targets(lids: Lids, upper: float, lower: float, gaze: np.ndarray) -> np.ndarray:
     """(v, 3) mm: where the lid vertices want to be. upper, lower: 0 rest, 1 closed, negative wider.
 
-    The upper lid follows a vertical gaze; the lower one follows a downward gaze by half.
+    The upper lid follows a vertical gaze (lid kinematics: 0.8 to 1 of it), the lower one a little. The cornea lifts the
+    lid that it slides under, and the fold over the crease is drawn flat as the lid goes down.
     """
-    follow = float(gaze[1])
-    seal = _SEAL * np.clip(upper, 0, 1) ** 4 * (lids.opening > 0)
-    travel = (1 - LOWER_SHARE) * lids.opening + (_WAKE * lids.missing if upper < 0 else 0.0)
-    turn_upper = -upper * travel - seal + 0.55 * follow * np.minimum(lids.opening / 0.5, 1)
-    turn_lower = lower * LOWER_SHARE * lids.opening + (0.3 * min(follow, 0) + 0.1 * max(follow, 0)) * np.minimum(
-        lids.opening / 0.5, 1
-    )
-    # never past each other: the meeting line limits both
-    closed = turn_lower - turn_upper
-    most = lids.opening + _SEAL
-    over = np.where(closed > most, most / np.maximum(closed, 1e-9), 1.0)
-    angle = lids.elevation + lids.weight * np.where(lids.upper, turn_upper, turn_lower) * over
-    frame = lids.along[:, None] * lids.axis
+    down, rise = max(-float(gaze[1]), 0.0), max(float(gaze[1]), 0.0)
+    travel = lids.opening + (_WAKE * lids.missing if upper < 0 else 0.0)
+    free = np.minimum(lids.opening / 0.5, 1)
+    turn_upper = -upper * (1 - LOWER_SHARE) * travel + free * (_FOLLOW[1] * rise - _FOLLOW[0] * down)
+    turn_lower = lower * LOWER_SHARE * lids.opening + free * (_FOLLOW[3] * rise - _FOLLOW[2] * down)
+    # never past each other: the meeting line limits both, whichever way the eye looks
+    closed = np.maximum(turn_lower - turn_upper, 1e-9)
+    over = np.minimum(lids.opening / closed, 1.0)
+    share = np.clip(closed * over / np.maximum(lids.opening, 1e-9), 0, 1)
+    press = lids.seal * share**4 * (lids.opening > 0)
+    turn = np.where(lids.upper, turn_upper * over - press, turn_lower * over + press)
+    angle = lids.elevation + lids.weight * turn
 
-    def at(radius):
-        plane = np.cos(angle)[:, None] * lids.forward + np.sin(angle)[:, None] * lids.up
-        return lids.eye.centre + frame + radius[:, None] * plane
-
-    target = at(lids.radius)
-    rel = target - lids.eye.centre
-    size = np.linalg.norm(rel, axis=1)
     rest = at_rest(lids) - lids.eye.centre
     rest_size = np.linalg.norm(rest, axis=1)
-    gap = np.minimum(rest_size - eyeball_radius(lids, lids.eye.centre + rest, np.zeros(2)), 0.15)
-    need = eyeball_radius(lids, target, gaze) + gap
-    return lids.eye.centre + rel * (np.maximum(size, need) / np.maximum(size, 1e-9))[:, None]
+    gap = rest_size - eyeball_radius(lids, lids.eye.centre + rest, np.zeros(2))
+    # skin that hung in the fold is drawn flat over the ball
+    drawn = np.clip(-turn / 0.7, 0, 1) * (lids.upper & ~lids.inner) * np.clip(4 * lids.weight * (1 - lids.weight), 0, 1)
+    height = gap - drawn * np.maximum(gap - _TAUT - 6 * (1 - lids.weight) ** 3, 0)
+    plane = np.cos(angle)[:, None] * lids.forward + np.sin(angle)[:, None] * lids.up
+    target = lids.along[:, None] * lids.axis + lids.radius[:, None] * plane
+    size = np.linalg.norm(target, axis=1)
+    # near the ball, heights are over what lies below now
+    under = eyeball_radius(lids, lids.eye.centre + target, gaze)
+    close = lids.weight * np.clip((5.0 - gap) / 2.5, 0, 1)
+    want = size + close * (under + height - size) + (1 - close) * (height - gap)
+    want = np.maximum(want, under + np.minimum(gap, 0.15))
+    return lids.eye.centre + target * (want / np.maximum(size, 1e-9))[:, None]
 
 
 def at_rest(lids: Lids) -> np.ndarray:

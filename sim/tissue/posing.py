@@ -3,6 +3,7 @@
 
 import numpy as np
 
+from ..anatomy.eyeball import turned_eye
 from ..anatomy.head import JAW_PARTS
 from .jaw import jaw_transform
 from .lids import gaze_rotation
@@ -19,7 +20,7 @@ def posed_parts(model: Model, state: State, control: Control) -> dict[str, np.nd
             out[part] = vertices @ rotation.T + translation
         elif part.startswith("eye_"):
             centre = model.eyes[0 if part.endswith("_l") else 1].centre
-            out[part] = (vertices - centre) @ turn.T + centre
+            out[part] = turned_eye(vertices, centre, turn)
         else:
             out[part] = vertices.copy()
     return out

@@ -83,7 +83,8 @@ class Lids:
     axis, forward, up : the eye's frame; along, elevation, radius (v,) the cylindrical coordinates of each vertex
     hold (v,) share of the lid stiffness with which it is held to its place
     upper : (v,) bool; opening (v,) rad between the margins at the vertex's place;
-    missing (v,) rad that a scan with closed eyes lacks to an open eye
+    missing (v,) rad that a scan with closed eyes lacks to an open eye; inner (v,) bool: behind the margin
+    seal (v,) rad by which each lid goes on when closed, until the limit surfaces meet
     profile : (b,) eyeball radius over the angle from the gaze, `profile_angle` (b,)
     """
 
@@ -101,6 +102,8 @@ class Lids:
     hold: np.ndarray
     opening: np.ndarray
     missing: np.ndarray
+    inner: np.ndarray
+    seal: np.ndarray
     contact_column: np.ndarray
     clearance: np.ndarray
     profile_angle: np.ndarray
