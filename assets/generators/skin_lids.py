@@ -89,15 +89,17 @@ def finish_lids(layout: Layout, x: np.ndarray) -> None:
     patch = layout.patches["eye_l"]
     x[patch[1, 1:-1]] = back + centre
     smooth = limit(layout.faces, layout.count)
-    front, on_ball = ring[2:7].ravel(), ring[6][inner >= 2]
+    front, on_ball = ring[2:7].ravel(), ring[6][inner >= 3]
     want = np.concatenate([goal[k] for k in range(2, 7)]) + centre
-    firm = np.repeat([0.5, 0.8, 0.8, 0.9, 0.9], 24)[:, None]
+    firm = (
+        np.array([0.5, 0.8, 0.8, 0.9, 0.9])[:, None] * np.clip((np.minimum(inner, outer) - 0.4) / 2.6, 0, 1)
+    ).reshape(-1, 1)
     rows = smooth[front]
     behind = np.unique(np.concatenate([ring[7], ring[8], patch[1, 1:-1]]))
     lining = smooth[behind]
     for _ in range(24):
         x[front] += firm * (want - rows @ x) + 0.08 * (want - x[front])
-        x[on_ball] = _clear(x[on_ball] - centre, 0.16, 0.46) + centre
+        x[on_ball] = _clear(x[on_ball] - centre, 0.22, 0.47) + centre
         away = lining @ x - centre
         x[behind] += _clear(away, 0.7, np.inf) - away
 
@@ -131,14 +133,15 @@ def _margins(inner, outer, above):
         room = (reach(BALL, np.arctan2(across, depth)) + GAP) ** 2 - across**2
         depth = np.sqrt(np.maximum(room, 1.5))
     # the inner corner leaves the ball and makes room for the caruncle
-    lake = np.array([-8.4, -7.6, -6.6])
+    lake = np.array([-8.4, -8.2, -7.7])
     edge[:, 1] = np.where(inner < 3, np.append(lake, np.zeros(10))[inner], -depth)
     edge[14, [0, 1]] = 12.1, -2.2
-    flat = unit(edge)
-    forward = np.where(above[:, None], unit(flat * [1, 1, 0.35]), unit(flat * [1, 1, 0.9]))
+    # the edges face forward, the upper one level, toward the corners more than the ball's own surface does
+    turn = np.stack([np.clip(np.minimum(inner, outer) / 4, 0, 1), np.ones(24), np.where(above, 0.35, 0.9)], axis=1)
+    forward = unit(edge * turn)
     thick = np.interp(np.minimum(inner, outer), [0, 1, 2, 3], [0.5, 1.1, 1.5, THICKNESS])
     rim = edge + forward * thick[:, None]
-    rim[2] = edge[2] + [-1.0, -0.4, 0]
+    rim[2] = edge[2] + [-1.2, -0.5, 0]
     rim[14] = edge[14] + [1.2, 0.1, 0]
     return edge, rim
 
@@ -181,11 +184,15 @@ def _cup(edge, inner, outer, above):
     """Fornix and cup (24, 3) each and the row (9, 3) that closes the cup, clear of the ball."""
     side = 1.05 * edge[:, 0]
     ramp = np.clip(np.minimum(inner, outer) / 2, 0, 1)
-    angle = np.arctan2(edge[:, 2], -edge[:, 1]) + np.radians(FORNIX) * np.where(above, 1, -1) * ramp
+    angle = np.arctan2(edge[:, 2], -edge[:, 1]) + np.radians(FORNIX) * np.where(above, 1, -1) * np.clip(
+        np.minimum(inner, outer) / 3, 0, 1
+    )
     depth = np.sqrt(np.maximum((RADIUS + 2.0) ** 2 - side**2, 16))
     lining = np.stack([side, -depth * np.cos(angle), depth * np.sin(angle)], axis=1)
     corner = np.where((inner < outer)[:, None], [-14.2, -3.6, -2.0], [13.2, 1.0, -0.6])
     lining = lerp(corner, lining, ramp)
+    beside = (inner == 1) | (outer == 1)
+    lining[beside, 2] = edge[beside, 2] + np.where(above, 1.6, -1.6)[beside]
     i = np.arange(24)
     around = np.pi + (i - 2) * 2 * np.pi / 24
     circle = np.stack([np.cos(around), np.zeros(24), np.sin(around)], axis=1)

@@ -206,9 +206,7 @@ def lids_on_eye(reference: Head, skin, ball, eye, k: int, side: str, inner):
     old = reference.eyes[k]
     lid = np.maximum(group(reference, f"lid_upper_{side}"), group(reference, f"lid_lower_{side}"))
     rest = reference.skin.vertices - old.centre
-    height = np.linalg.norm(rest, axis=1) - eyeballs.profile_of(old)(
-        angle_from(rest, old.gaze)
-    )
+    height = np.linalg.norm(rest, axis=1) - eyeballs.profile_of(old)(angle_from(rest, old.gaze))
     rows = np.flatnonzero((lid > 0.05) & (height < 0.4 * old.radius) & (rest @ old.gaze > 0))
     if len(rows) == 0:
         return skin

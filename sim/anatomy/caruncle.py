@@ -13,9 +13,9 @@ from .head import Eye
 
 _AROUND, _RINGS = 12, 6
 #: Caruncle: (from the corner toward the eye, behind the corner, up) and its half sizes the same way, mm.
-_PLACE, _SIZE = (2.9, 1.9, 0.0), (2.2, 1.3, 1.2)
+_PLACE, _SIZE = (3.65, 1.8, 0.1), (1.65, 1.15, 1.1)
 #: Semilunar fold: angle from the caruncle along the ball, rad; half sizes (along, off the ball, up), mm.
-_FOLD, _FOLD_SIZE = 0.1, (0.9, 0.35, 1.5)
+_FOLD, _FOLD_SIZE = 0.05, (0.8, 0.35, 1.55)
 
 
 def caruncle(eye: Eye, corner: np.ndarray) -> Mesh:
@@ -43,7 +43,7 @@ def caruncle_vertices(eye: Eye, corner: np.ndarray) -> np.ndarray:
     egg = _egg() * (size * np.array(_FOLD_SIZE))
     bow = (egg[:, 2] / (size * _FOLD_SIZE[2])) ** 2
     angle = polar - (egg[:, 0] + 0.5 * size * bow) / eye.radius
-    height = toward @ up + 0.35 * size + egg[:, 2]
+    height = toward @ up + 0.2 * size + egg[:, 2]
     radius = np.sqrt(np.maximum((lift + egg[:, 1]) ** 2 - height**2, 1.0))
     second = (
         eye.centre

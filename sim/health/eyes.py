@@ -10,7 +10,7 @@ from ..anatomy.inside import inside
 
 #: Along the way from the inner corner of the eye (0) to the outer one (1): where lids lie on the eyeball. The caruncle
 #: fills the inner corner, and at the outer one the lids part from the ball.
-BETWEEN = (0.2, 0.92)
+BETWEEN = (0.24, 0.92)
 
 
 def margin_rows(head: Head, side: str) -> np.ndarray:
