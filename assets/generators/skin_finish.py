@@ -36,22 +36,13 @@ def _smooth_outside(layout: Layout, x: np.ndarray) -> np.ndarray:
 
 
 def _against_rounding(layout: Layout, x: np.ndarray, strength: float = 0.5) -> np.ndarray:
-    """Nose and jaw stand out by what subdivision will round off them: their limit surface is the shape measured."""
-    weight = np.zeros(layout.count)
-    for u in range(-12, 13):
-        for v in range(8, 27):
-            vertex = layout.grid[v, u % (2 * HALF)]
-            if vertex >= 0:
-                nose = np.interp(abs(u), [0, 2, 3, 5, 7], [0.2, 0.4, 1, 1, 0.4]) * np.interp(
-                    v, [8, 10, 15, 16], [0, 1, 1, 0.5]
-                )
-                jaw = np.interp(v, [20, 22, 26], [0, 1, 1]) * np.interp(abs(u), [10, 12], [1, 0])
-                weight[vertex] = max(nose, jaw)
+    """The nostrils' rims, which no scan fits, stand out by what subdivision will round off them."""
+    weight = np.zeros((layout.count, 1))
     weight[np.concatenate([layout.rings["nostril" + side][0] for side in ("_l", "_r")])] = 1
     smooth = limit(layout.faces, layout.count)
     out = x.copy()
     for _ in range(2):
-        out += strength * weight[:, None] * (x - smooth @ out)
+        out += strength * weight * (x - smooth @ out)
     return out
 
 

@@ -7,13 +7,15 @@ from scipy.sparse.linalg import splu
 
 from ...sim.adapt.closest import Surface
 from ...sim.adapt.thin_plate_spline import ThinPlateSpline
-from ...sim.mesh import Mesh, vertex_normals
+from ...sim.mesh import Mesh, edges, vertex_normals
+from ...sim.mesh_subdivision import limit
 from .skin_bust import NECK_ROW
+from .skin_heads import MeasuredSubject
 from .skin_layout import Layout
 
 
 def outer_skin(layout: Layout, eyes_open: bool = True) -> np.ndarray:
-    """(n,) bool: vertices that lie on what a scan shows reliably (no ears, no inside, no lid margins)."""
+    """(n,) bool: vertices that lie on what a scan shows reliably (no ears, no nostrils, no inside, no lid margins)."""
     outer = np.zeros(layout.count, dtype=bool)
     outer[layout.grid[layout.grid >= 0]] = True
     outer[layout.crown] = True
@@ -21,6 +23,7 @@ def outer_skin(layout: Layout, eyes_open: bool = True) -> np.ndarray:
     for side in ("_l", "_r"):
         outer[layout.rings["eye" + side][1:4]] = eyes_open
         outer[layout.rings["ear" + side][0]] = False
+        outer[layout.rings["nostril" + side][0]] = False
     below = layout.grid[NECK_ROW + 2 :]
     outer[below[below >= 0]] = False  # shoulders are carried differently by everyone
     return outer
@@ -55,26 +58,43 @@ def fit_skin(
     layout: Layout,
     start: np.ndarray,
     start_landmarks: dict[str, np.ndarray],
-    vertices: np.ndarray,
-    triangles: np.ndarray,
-    landmarks: dict[str, np.ndarray],
-    eyes_open: bool = True,
-    lengths: tuple[float, ...] = (45, 30, 22, 16, 12),
+    subject: MeasuredSubject,
+    lengths: tuple[float, ...] = (45, 30, 22, 16, 12, 9, 7),
     reach: float = 12.0,
-) -> np.ndarray:
-    """(n, 3) mm: ``start`` on the head (``vertices``, ``triangles``), stiff over each of ``lengths`` mm in turn."""
+) -> tuple[np.ndarray, np.ndarray]:
+    """Control vertices (n, 3) mm whose limit surface lies on a head, and how far each is known there, (n,) 0..1.
+
+    ``start`` is stiff over each of ``lengths`` mm in turn; the limit operator stands in the normal equations, so that
+    what subdivision rounds off is made up for.
+    """
     skin = Mesh(start, layout.faces).triangles
-    surface = Surface(vertices, triangles)
-    names = sorted(set(landmarks) & set(start_landmarks))
-    spline = ThinPlateSpline.fit(np.array([start_landmarks[n] for n in names]), np.array([landmarks[n] for n in names]))
+    surface = Surface(subject.vertices, subject.triangles)
+    names = sorted(set(subject.landmarks) & set(start_landmarks))
+    spline = ThinPlateSpline.fit(
+        np.array([start_landmarks[n] for n in names]), np.array([subject.landmarks[n] for n in names])
+    )
     x = spline.transform(start)
     energy, mass = bending(start, skin)
-    use = outer_skin(layout, eyes_open)
+    smooth = limit(layout.faces, layout.count)
+    use = outer_skin(layout, subject.eyes_open) & subject.seen(start)
     for length in lengths:
-        contact = surface.closest(x)
-        facing = (contact.normals * vertex_normals(x, skin)).sum(axis=1) > 0.5
+        on = smooth @ x
+        contact = surface.closest(on)
+        facing = (contact.normals * vertex_normals(on, skin)).sum(axis=1) > 0.5
         ok = use & contact.found & (contact.distance < reach) & facing & ~contact.border
-        step = np.where(ok[:, None], contact.points - x, 0.0)
-        hold = diags(mass * (ok + 1e-4))
-        x = x + splu((hold + length**4 * energy).tocsc()).solve(hold @ step)
-    return x
+        step = np.where(ok[:, None], contact.points - on, 0.0)
+        hold = diags(mass * ok)
+        system = smooth.T @ hold @ smooth + diags(1e-4 * mass) + length**4 * energy
+        x = x + splu(system.tocsc()).solve(smooth.T @ (hold @ step))
+    return x, _spread(layout, ok.astype(float))
+
+
+def _spread(layout: Layout, known: np.ndarray, rounds: int = 3) -> np.ndarray:
+    """Weights (n,) softened over the neighbours, so that a mean of heads has no steps where one of them ends."""
+    pairs = edges(layout.faces)
+    ij = (np.r_[pairs[:, 0], pairs[:, 1]], np.r_[pairs[:, 1], pairs[:, 0]])
+    link = coo_matrix((np.ones(2 * len(pairs)), ij), shape=(layout.count,) * 2).tocsr()
+    degree = np.asarray(link.sum(axis=1)).ravel()
+    for _ in range(rounds):
+        known = 0.5 * known + 0.5 * (link @ known) / degree
+    return known

@@ -26,6 +26,10 @@ class MeasuredHead:
         corner = [self.surface.vertices[self.surface.triangles[:, k]] for k in range(3)]
         self._a, self._e1, self._e2 = corner[0], corner[1] - corner[0], corner[2] - corner[0]
 
+    def mirrored(self) -> "MeasuredHead":
+        """The same head with its sides exchanged."""
+        return MeasuredHead(self.surface.vertices * [-1, 1, 1], self.surface.triangles[:, ::-1])
+
     def cast(self, starts, direction) -> np.ndarray:
         """(k, 3) first hits of rays from ``starts`` (k, 3); nan where nothing is hit (Möller and Trumbore 1997)."""
         starts = np.atleast_2d(starts).astype(float)
