@@ -92,3 +92,38 @@ def muscle_layers(head: Head) -> list[Layer]:
         colour = np.array(colorsys.hsv_to_rgb(hue, 0.55, 0.8)) * 0.6 + np.array([0.7, 0.25, 0.2]) * 0.4
         layers.append(Layer(muscle.shape.vertices, muscle.shape.triangles, colour))
     return layers
+
+
+def mark_layer(points: np.ndarray, radius: float = 1.4) -> Layer:
+    """A small octahedron for each of (k, 3) points."""
+    axes = np.concatenate([np.eye(3), -np.eye(3)])
+    faces = np.array([[0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2], [1, 0, 5], [3, 1, 5], [4, 3, 5], [0, 4, 5]])
+    vertices = (points[:, None] + radius * axes).reshape(-1, 3)
+    triangles = (faces[None] + 6 * np.arange(len(points))[:, None, None]).reshape(-1, 3)
+    return Layer(vertices, triangles, np.array([0.1, 0.45, 0.85]))
+
+
+def feature_layer(head: Head) -> Layer:
+    """The feature mesh with its edges."""
+    at = head.landmark_positions()
+    points = np.array([at[name] for name in head.landmarks.names])
+    pairs = np.concatenate([head.feature_mesh[:, [k, (k + 1) % 3]] for k in range(3)])
+    return Layer(points, head.feature_mesh, np.array([0.75, 0.75, 0.72]), points[pairs])
+
+
+def texture_layer(skin: Mesh, size: float = 200.0) -> Layer:
+    """The texture square laid out in the plane y = 0: bluer where a mm of skin has more texels, redder where fewer."""
+    corners = skin.uv.astype(float) - 0.5
+    flat = size * np.stack([corners[..., 0], np.zeros(corners.shape[:2]), corners[..., 1]], axis=-1)
+
+    def area(quads):
+        cross = np.cross(quads[:, 2] - quads[:, 0], quads[:, 3] - quads[:, 1])
+        return 0.5 * np.linalg.norm(cross, axis=1)
+
+    ratio = area(flat) / np.maximum(area(skin.vertices[skin.faces]), 1e-6)
+    t = np.clip(0.5 + 0.25 * np.log2(ratio / np.median(ratio)), 0, 1)[:, None]
+    colour = np.repeat((1 - t) * [0.9, 0.45, 0.35] + t * [0.4, 0.6, 0.95], 4, axis=0)
+    index = np.arange(flat.shape[0] * 4).reshape(-1, 4)
+    lines = np.stack([flat, np.roll(flat, -1, axis=1)], axis=2).reshape(-1, 2, 3)
+    triangles = np.concatenate([index[:, [0, 1, 2]], index[:, [0, 2, 3]]])
+    return Layer(flat.reshape(-1, 3), triangles, colour, lines, gloss=0.0)

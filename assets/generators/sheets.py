@@ -18,7 +18,18 @@ from ...sim.anatomy.storage import load_head
 from ...sim.mesh import Mesh
 from ...sim.scan.viewpoint import Viewpoint
 from .picture import Layer, draw, montage, write_png
-from .sheet_layers import SKIN, bone_layers, eye_layers, mouth_layers, muscle_layers, part_layer, skin_layer
+from .sheet_layers import (
+    SKIN,
+    bone_layers,
+    eye_layers,
+    feature_layer,
+    mark_layer,
+    mouth_layers,
+    muscle_layers,
+    part_layer,
+    skin_layer,
+    texture_layer,
+)
 
 #: (yaw toward the subject's left, pitch up) in degrees.
 SIX = ((0, 0), (40, 5), (90, 0), (145, 8), (25, -38), (20, 45))
@@ -84,6 +95,17 @@ class Sheets:
     def facewire(self):
         """The face with its edges, larger."""
         return self._six([self.wired, *self.eyes], [0, -40, -15], 170, SIX[:2], 1.8)
+
+    def landmarks(self):
+        """The landmarks on the skin, and the feature mesh that joins them."""
+        dots = mark_layer(np.array(list(self.marks.values())))
+        views = ((0, 0), (45, 5), (90, 0), (25, -38))
+        features = feature_layer(self.head)
+        return montage([self._row(layers, [0, -20, 15], 250, views) for layers in ([self.plain, dots], [features])])
+
+    def texture(self):
+        """The texture square; bluer where there are more texels per mm."""
+        return draw([texture_layer(self.head.skin)], camera([0, 0, 0], 0, 0, 204, 3 * self.pixels))
 
     def eye(self):
         """The left eye."""
@@ -156,7 +178,7 @@ class Sheets:
 
 SHEETS = (
     *("skin", "wire", "face", "facewire", "eye", "ear", "nose", "lips", "skull", "muscles", "rows", "tongue"),
-    *("eyeballs", "poses", "mouth"),
+    *("eyeballs", "poses", "mouth", "landmarks", "texture"),
 )
 
 

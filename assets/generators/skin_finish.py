@@ -8,7 +8,7 @@ import numpy as np
 
 from ...sim.mesh_subdivision import limit
 from .skin_ear import finish_ear
-from .skin_fit import fair
+from .skin_fit import fair, nose_end
 from .skin_layout import HALF, ROWS, Layout
 from .skin_lids import finish_lids
 from .skin_lips import finish_lips
@@ -36,8 +36,8 @@ def _smooth_outside(layout: Layout, x: np.ndarray) -> np.ndarray:
 
 
 def _against_rounding(layout: Layout, x: np.ndarray, strength: float = 0.5) -> np.ndarray:
-    """The nostrils' rims, which no scan fits, stand out by what subdivision will round off them."""
-    weight = np.zeros((layout.count, 1))
+    """The end of the nose, which was not fitted in detail, stands out by what subdivision will round off it."""
+    weight = nose_end(layout).astype(float)[:, None]
     weight[np.concatenate([layout.rings["nostril" + side][0] for side in ("_l", "_r")])] = 1
     smooth = limit(layout.faces, layout.count)
     out = x.copy()

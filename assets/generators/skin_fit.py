@@ -13,6 +13,9 @@ from .skin_bust import NECK_ROW
 from .skin_heads import MeasuredSubject
 from .skin_layout import Layout
 
+#: The end of the nose is fitted no finer than this, mm.
+COARSE = 14.0
+
 
 def outer_skin(layout: Layout, eyes_open: bool = True) -> np.ndarray:
     """(n,) bool: vertices that lie on what a scan shows reliably (no ears, no nostrils, no inside, no lid margins)."""
@@ -27,6 +30,15 @@ def outer_skin(layout: Layout, eyes_open: bool = True) -> np.ndarray:
     below = layout.grid[NECK_ROW + 2 :]
     outer[below[below >= 0]] = False  # shoulders are carried differently by everyone
     return outer
+
+
+def nose_end(layout: Layout) -> np.ndarray:
+    """(n,) bool: tip and wings of the nose, too small for scans to be averaged point by point."""
+    end = np.zeros(layout.count, dtype=bool)
+    part = np.concatenate([layout.grid[11:16, u] for u in range(-4, 5)])
+    end[part[part >= 0]] = True
+    end[layout.grid[15, 0]] = False
+    return end
 
 
 def bending(vertices: np.ndarray, triangles: np.ndarray):
@@ -77,16 +89,23 @@ def fit_skin(
     energy, mass = bending(start, skin)
     smooth = limit(layout.faces, layout.count)
     use = outer_skin(layout, subject.eyes_open) & subject.seen(start)
+    end = nose_end(layout)
     for length in lengths:
         on = smooth @ x
         contact = surface.closest(on)
         facing = (contact.normals * vertex_normals(on, skin)).sum(axis=1) > 0.5
-        ok = use & contact.found & (contact.distance < reach) & facing & ~contact.border
+        ok = (
+            (use & ~end if length < COARSE else use)
+            & contact.found
+            & (contact.distance < reach)
+            & facing
+            & ~contact.border
+        )
         step = np.where(ok[:, None], contact.points - on, 0.0)
         hold = diags(mass * ok)
         system = smooth.T @ hold @ smooth + diags(1e-4 * mass) + length**4 * energy
         x = x + splu(system.tocsc()).solve(smooth.T @ (hold @ step))
-    return x, _spread(layout, ok.astype(float))
+    return x, _spread(layout, (ok | (end & use)).astype(float))
 
 
 def _spread(layout: Layout, known: np.ndarray, rounds: int = 3) -> np.ndarray:

@@ -52,10 +52,10 @@ def _energy(flat, triangles, inverse, area):
     return float((area * size * (1 + 1 / det**2)).sum()), gradient, det.min()
 
 
-def relax(vertices, triangles, flat, gain, on_axis, rounds: int = 150) -> np.ndarray:
+def relax(vertices, triangles, flat, gain, weight, on_axis, rounds: int = 300) -> np.ndarray:
     """(n, 2): ``flat`` moved toward true lengths times ``gain`` (t,) without ever folding a triangle.
 
-    Vertices ``on_axis`` stay on x = 0; all others are free. Descent preconditioned by a Laplacian of the mesh.
+    ``weight`` (t,) says how much a triangle counts for its area. Vertices ``on_axis`` stay on x = 0; all others are free. Descent preconditioned by a Laplacian of the mesh.
     """
     a, b, c = (vertices[triangles[:, k]] for k in range(3))
     e1, e2 = b - a, c - a
@@ -65,7 +65,7 @@ def relax(vertices, triangles, flat, gain, on_axis, rounds: int = 150) -> np.nda
     y2 = np.maximum(y2, 0.08 * np.maximum(x1, np.abs(x2)))  # slivers do not count more than others
     rest = np.zeros((len(triangles), 2, 2))
     rest[:, 0, 0], rest[:, 0, 1], rest[:, 1, 1] = gain * x1, gain * x2, gain * y2
-    area = 0.5 * x1 * y2
+    area = 0.5 * x1 * y2 * weight
     inverse = np.linalg.inv(rest)
     fa, fb, fc = (flat[triangles[:, k]] for k in range(3))
     flat_area = 0.5 * np.abs((fb - fa)[:, 0] * (fc - fa)[:, 1] - (fb - fa)[:, 1] * (fc - fa)[:, 0]).sum()
