@@ -55,7 +55,8 @@ def _energy(flat, triangles, inverse, area):
 def relax(vertices, triangles, flat, gain, weight, on_axis, rounds: int = 300) -> np.ndarray:
     """(n, 2): ``flat`` moved toward true lengths times ``gain`` (t,) without ever folding a triangle.
 
-    ``weight`` (t,) says how much a triangle counts for its area. Vertices ``on_axis`` stay on x = 0; all others are free. Descent preconditioned by a Laplacian of the mesh.
+    ``weight`` (t,) says how much a triangle counts for its area. Vertices ``on_axis`` stay on x = 0; all others are
+    free. Descent preconditioned by a Laplacian of the mesh.
     """
     a, b, c = (vertices[triangles[:, k]] for k in range(3))
     e1, e2 = b - a, c - a
