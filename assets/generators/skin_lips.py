@@ -58,7 +58,7 @@ _PHILTRUM = {
 
 #: mm between the red's border and the next row of skin, as a share of what was measured: near, for a crisp border; and
 #: how much of the border's way the row beyond it follows.
-_NEAR, _FOLLOW = 0.68, 0.25
+_NEAR, _FOLLOW = 0.85, 0.25
 
 
 def lip_places():
