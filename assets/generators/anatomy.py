@@ -49,7 +49,7 @@ def make_anatomy(skin: Mesh, groups: dict[str, np.ndarray], landmarks: dict[str,
         "eye_r": eye_meshes[1],
         "teeth_upper": upper,
         "teeth_lower": lower,
-        "tongue": tongue.make_tongue(skin, groups, landmarks, lower),
+        "tongue": tongue.make_tongue(skin, groups, landmarks, upper, lower),
     }
     yield Progress(0.7, "Muscles")
     bones = {name: mesh.vertices for name, mesh in parts.items()}

@@ -1,59 +1,81 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The tongue: a closed soft body resting in the lower arch."""
+"""The tongue at rest: tip behind the lower incisors, domed back with its median groove, root going down and back."""
 
 import numpy as np
 
 from ...sim.mesh import Mesh
+from .mouth_room import MouthRoom
 from .skull_field import curve
-from .teeth import Mouth
+from .teeth_shape import tube_faces
 
-AROUND, ALONG = 16, 14
+AROUND, ALONG = 20, 20
 
-
-def make_tongue(skin: Mesh, groups: dict[str, np.ndarray], landmarks: dict[str, np.ndarray], teeth_lower: Mesh) -> Mesh:
-    """The tongue's mesh, its tip behind the lower incisors, inside the teeth and the lining of the mouth."""
-    mouth = Mouth(skin, groups, landmarks)
-    gum = teeth_lower.vertices
-    tip = gum[np.abs(gum[:, 0]) < 2.5, 1].max() + 1.5
-    back = mouth.back - 2.0
-    low, high = mouth.floor + 3.0, mouth.line + 3.2
-    share = np.linspace(0, 1, ALONG)
-    # Half width, back of the tongue, underside: from tip to root.
-    stations = np.column_stack([np.linspace(tip, back, 6), _half_width(gum, np.linspace(tip, back, 6)),
-                                [high - 6.5, high - 3.0, high - 0.6, high, high - 1.0, high - 4.0],
-                                [high - 9.0, low + 1.5, low, low, low, low + 1.0]])  # fmt: skip
-    line = curve(stations, ALONG)
-    turn = 2 * np.pi * np.arange(AROUND) / AROUND
-    c, s = np.cos(turn), np.sin(turn)
-    middle, half = (line[:, 2] + line[:, 3]) / 2, (line[:, 2] - line[:, 3]) / 2
-    groove = -0.9 * np.exp(-((c / 0.25) ** 2)) * (s > 0) * np.sin(np.pi * share)[:, None]
-    x = line[:, 1, None] * (np.sign(c) * np.abs(c) ** 0.8)[None]
-    z = middle[:, None] + half[:, None] * (np.sign(s) * np.abs(s) ** 0.8)[None] + groove
-    y = np.repeat(line[:, :1], AROUND, axis=1)
-    rings = np.stack([x, y, z], axis=2)
-    tip_point = [0, tip - 0.8, middle[0]]
-    root = [0, back + 0.8, middle[-1]]
-    vertices = np.concatenate([rings.reshape(-1, 3), [tip_point, root]])
-    j = np.arange(AROUND)
-    k = (j + 1) % AROUND
-    none = np.full(AROUND, -1)
-    faces = [np.stack([np.full(AROUND, ALONG * AROUND), j, k, none], axis=1)]
-    for i in range(ALONG - 1):
-        a, b = i * AROUND, (i + 1) * AROUND
-        faces.append(np.stack([a + j, b + j, b + k, a + k], axis=1))
-    a = (ALONG - 1) * AROUND
-    faces.append(np.stack([np.full(AROUND, ALONG * AROUND + 1), a + k, a + j, none], axis=1))
-    faces = np.concatenate(faces).astype(np.int32)
-    return Mesh(vertices, faces, material=np.zeros(len(faces), np.int16))
+#: Middle line of the upper side and of the underside, tip to root: share of the way back, mm over the line of the lips.
+TOP = (
+    (0.0, -3.6),
+    (0.035, -1.8),
+    (0.13, 0.4),
+    (0.3, 3.4),
+    (0.5, 6.4),
+    (0.68, 7.4),
+    (0.83, 5.6),
+    (0.94, 0.6),
+    (1, -7.0),
+)
+UNDER = ((0.0, -4.6), (0.04, -6.0), (0.12, -8.0), (0.22, -11.5), (0.36, -15), (0.5, -16.5), (0.66, -17), (0.8, -16.5),
+         (0.9, -14.5))  # fmt: skip
+#: mm kept to teeth and gums, to the roof of the mouth, to its floor and walls.
+BESIDE, ABOVE, CLEAR = 1.0, 2.2, 0.8
 
 
-def _half_width(gum, y):
-    """Half the free width between the lower teeth and gums at each ``y``, less 1.5 mm; rounded at the tip."""
+def make_tongue(
+    skin: Mesh, groups: dict[str, np.ndarray], landmarks: dict[str, np.ndarray], teeth_upper: Mesh, teeth_lower: Mesh
+) -> Mesh:
+    """The tongue's mesh of quads, within the rows of teeth and the lining of the mouth, mm."""
+    room = MouthRoom(skin, groups, landmarks)
+    teeth = np.concatenate([_enamel(teeth_upper), teeth_lower.vertices])
+    teeth = teeth[np.abs(teeth[:, 2] - room.line) < 14]
+    front = teeth[(np.abs(teeth[:, 0]) < 3) & (teeth[:, 2] < room.line - 2), 1].max() + BESIDE
+    back = room.back - 2.0
+    top, under = (curve(np.array(line), ALONG) for line in (TOP, UNDER))
+    turn = np.linspace(-np.pi / 2, np.pi / 2, AROUND // 2 + 1)  # left half, from under the tongue to its back
+    side, up = np.cos(turn), np.sin(turn)
+    rings = np.zeros((ALONG, len(turn), 3))
+    rise = 0.5 + 0.5 * np.sign(up) * np.abs(up) ** 0.9
+    for axis, scale, start in ((1, back - front, front), (2, 1.0, room.line)):
+        line = [start + scale * each[:, axis - 1] for each in (under, top)]
+        rings[..., axis] = line[0][:, None] * (1 - rise) + line[1][:, None] * rise
+    plan = rings[..., :2].reshape(-1, 2)
+    roof, floor = (room.limit(plan, way).reshape(rings.shape[:2]) for way in (1, -1))
+    rings[..., 2] = np.maximum(np.minimum(rings[..., 2], roof - ABOVE), floor + CLEAR)
+    way = (rings[:, :, 1].mean(axis=1) - front)[:, None]
+    tip = 19.0 * np.sqrt(np.clip(1 - (1 - (way + 0.8) / 17) ** 2, 0.02, 1))
+    wide = np.minimum(_half_width(teeth, rings[..., 1]), np.where(way < 16, tip, np.inf))
+    share = np.linspace(0, 1, ALONG)[:, None]
+    wide = wide * np.interp(share, [0, 0.85, 1], [1, 1, 0.8])
+    rings[..., 0] = wide * side**0.75 * np.where(up < 0, 1 - 0.35 * up**2 * np.interp(share, [0, 0.3], [0, 1]), 1.0)
+    rings[..., 2] -= 1.1 * np.exp(-((rings[..., 0] / 2.2) ** 2)) * (up > 0.3) * np.sin(np.pi * share) ** 0.7
+    points = room.kept_in(rings.reshape(-1, 3), CLEAR).reshape(rings.shape)
+    points[:, [0, -1], 0] = 0.0
+    whole = np.concatenate([points, points[:, -2:0:-1] * [-1, 1, 1]], axis=1)
+    whole = np.roll(whole, -(AROUND // 4), axis=1)  # the closing strips run from the upper side to the underside
+    faces = tube_faces(ALONG, AROUND)
+    mesh = Mesh(whole.reshape(-1, 3), faces)
+    corner = mesh.vertices[mesh.triangles] - mesh.vertices.mean(axis=0)
+    if np.einsum("ij,ij->", corner[:, 0], np.cross(corner[:, 1], corner[:, 2])) < 0:
+        faces = np.where(faces[:, 3:] >= 0, faces[:, [0, 3, 2, 1]], faces[:, [0, 2, 1, 3]])
+    return Mesh(mesh.vertices, faces, material=np.zeros(len(faces), np.int16))
+
+
+def _enamel(mesh):
+    return mesh.vertices[np.unique(mesh.faces[mesh.material == 0][:, :3])]
+
+
+def _half_width(teeth, y):
+    """Half the free width between the teeth at depths ``y`` (any shape), mm."""
+    at = np.linspace(teeth[:, 1].min(), teeth[:, 1].max(), 60)
     inner = []
-    for at in y:
-        near = np.abs(gum[:, 1] - at) < 4
-        side = np.abs(gum[near, 0])
-        inner.append(max(side.min() - 1.5, 4.0) if near.any() and side.min() > 2 else 5.0)
-    inner = np.minimum.accumulate(np.array(inner)[::-1])[::-1]
-    inner[0] = min(inner[0], 4.5)
-    return inner
+    for each in at:
+        near = np.abs(teeth[np.abs(teeth[:, 1] - each) < 1.3, 0])
+        inner.append(near[near > 2].min(initial=40.0))
+    return np.interp(y, at, np.minimum.accumulate(np.array(inner)[::-1])[::-1]) - BESIDE
