@@ -14,11 +14,14 @@ from .skin_shape import landmark_seeds
 #: From the tragion to the hinge: mm back (y) and up (z).
 _HINGE = (-11.5, -7.0)
 
+#: The chin is found this far down from the lips, mm.
+_CHIN = 60.0
+
 #: The fan at |x| mm: degrees from its middle ray, which goes through the lips' corners, to where nothing or all moves.
 _FAN = ([0, 16, 45], [8.0, 9.0, 21.0])
 
 #: mm over which the share dies away below the line from chin to jaw angle: begins, ends at the throat and at the side.
-_BELOW = (0.0, 46.0, 34.0)
+_BELOW = (10.0, 57.0, 42.0)
 
 #: The same behind the rear border of the ramus: ends at the height of the ear lobe and of the jaw angle; its length.
 _BEHIND = (-5.0, 14.0, 36.0)
@@ -44,9 +47,11 @@ def _cheek(layout, vertices: np.ndarray) -> np.ndarray:
     """(n,) share by place alone."""
     seeds = landmark_seeds()
     hinge, angle = seeds["t"][1:] + _HINGE, seeds["go"][1:]
-    corner = vertices[layout.rings["mouth"][3, 19]][1:] - hinge
+    flat_corner = vertices[layout.rings["mouth"][3, 19]][1:]
+    corner = flat_corner - hinge
     aside, flat = abs(vertices[:, 0]), vertices[:, 1:]
-    front = layout.midline[vertices[layout.midline, 1] < hinge[0]]
+    middle_line = vertices[layout.midline]
+    front = layout.midline[(middle_line[:, 1] < hinge[0]) & (middle_line[:, 2] > flat_corner[1] - _CHIN)]
     chin = flat[front[np.argmin(flat[front].sum(axis=1))]]
 
     out = flat - hinge
@@ -89,7 +94,7 @@ def jaw_weights(p, vertices: np.ndarray) -> np.ndarray:
     for k, follow in _INSIDE.items():
         out[ring[k]] = lips + follow * (lining - lips)
     out[patch[1, 1:-1]] = 0.5
-    for _ in range(2):
+    for _ in range(1):
         out = np.where(mouth, out, 0.5 * out + 0.5 * (p.plain @ out) / degree)
     out[out < 0.004] = 0
     return out

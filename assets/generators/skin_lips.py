@@ -24,7 +24,7 @@ LIP_DEPTH = ([0, 6, 12, 19, 24.6], [-99.2, -98.9, -96.8, -92.0, -87.2])
 _X3 = (24.5, 21.6, 18.6, 15.5, 12.4, 9.3, 6.1, 2.9, 0)
 _X4 = (24.2, 21.2, 18.2, 15.1, 12.1, 9.0, 6.0, 3.0, 0)
 _X5 = (23.8, 20.8, 17.8, 14.8, 11.8, 8.9, 5.9, 2.95, 0)
-_X6 = (23.4, 20.5, 17.5, 14.6, 11.7, 8.8, 5.85, 2.9, 0)
+_X6 = (23.5, 20.5, 17.5, 14.6, 11.7, 8.8, 5.85, 2.9, 0)
 
 #: Height of the line where the lips meet, mm against its middle: the tubercle dips between two gentle arches.
 _LINE = (-0.6, -0.1, 0.3, 0.6, 0.8, 0.85, 0.6, 0.15, 0)
@@ -42,12 +42,16 @@ _BOW_Y = (18.3, 13.6, 9.8, 6.5, 3.8, 1.7, 0.3, -0.2, 0.1)
 _FULL_UPPER_Y = (19.1, 14.2, 10.6, 7.4, 4.7, 2.5, 1.1, 0.4, 0.2)
 _BASE_Y = (18.3, 15.1, 12.3, 9.8, 7.7, 6.1, 5.2, 4.8, 4.7)
 _FULL_LOWER_Y = (19.1, 14.6, 11.3, 8.3, 6.0, 4.4, 3.5, 3.1, 3.0)
-_EDGE_Y = (20.0, 15.2, 11.7, 8.9, 6.8, 5.1, 4.1, 3.6, 3.5)
-_LINE_Y = (21.3, 17.0, 13.7, 10.9, 8.8, 7.1, 6.1, 5.6, 5.5)
+_EDGE_Y = (20.0, 15.3, 11.4, 8.5, 6.2, 4.5, 3.5, 3.0, 2.9)
+_LINE_Y = (21.7, 17.0, 13.7, 10.9, 8.8, 7.1, 6.1, 5.6, 5.5)
 
 #: The lips lie against each other this far back from the line, mm; half the gap between them.
-_CONTACT = (2.2, 2.8, 3.2, 3.6, 3.9, 4.1, 4.2, 4.3, 4.3)
-_GAP = 0.02
+_CONTACT = (2.7, 2.8, 3.1, 3.6, 3.9, 4.1, 4.2, 4.3, 4.3)
+_GAP = (0, 0.05, 0.03, 0.02, 0.02, 0.02, 0.02, 0.02, 0.02)
+_EDGE_GAP = (0, 0.15, 0.22, 0.2, 0.17, 0.15, 0.15, 0.15, 0.15)
+
+#: The surface they touch in arches, so that no straight look gets through: mm up at edge, line and back.
+_STEP = (-0.8, 0.6, -0.8)
 
 #: Philtrum on the two rows of skin above the lip, from the middle sideways, groove to column to cheek: mm from the
 #: midline, mm behind the middle of the upper border, and how far these numbers rule over what was measured.
@@ -59,6 +63,10 @@ _PHILTRUM = {
 #: mm between the red's border and the next row of skin, as a share of what was measured: near, for a crisp border; and
 #: how much of the border's way the row beyond it follows.
 _NEAR, _FOLLOW = 0.85, 0.25
+
+
+#: How eagerly the cage stands out so that the limit surface comes where each row belongs; too much would fold it.
+_TRUE = {1: 0.5, 2: 0.25, 3: 0.6, 4: 0.9}
 
 
 def lip_places():
@@ -124,22 +132,25 @@ def finish_lips(layout: Layout, x: np.ndarray) -> None:
     edge = origin + _section(_X5, _EDGE_Y, _LINE)
     meet = origin + _section(_X6, _LINE_Y, _LINE)
     back = meet * [0.985, 1, 1] + _section(np.zeros(9), _CONTACT, np.zeros(9))
-    up = np.zeros((32, 3))
-    up[:, 2] = above
-    rounded = np.interp(away, [0, 1, 3, 8], [0, 0.25, 0.5, 0.6])[:, None]
-    edge += up * rounded - [0, 0, 0.3]
-    meet += up * _GAP
-    back += up * _GAP + [0, 0, 0.25]
+    for place, gap, step in zip((edge, meet, back), (_EDGE_GAP, _GAP, _GAP), _STEP, strict=True):
+        place[:, 2] += above * np.array(gap)[away] + step
+    for place in (edge, back):  # in one plane with their neighbours, or the lips' triangles would cut each other there
+        for corner, beside in ((19, (18, 20)), (3, (2, 4))):
+            here, there = meet[list(beside)].mean(axis=0), place[list(beside)].mean(axis=0)
+            normal = np.cross(here - meet[corner], there - meet[corner])
+            flat = place[corner, :2] - meet[corner, :2]
+            place[corner, 2] = meet[corner, 2] - flat @ normal[:2] / normal[2]
     near = border + _NEAR * (old[2] - old[3])
     beyond = old[1] + _FOLLOW * (border - old[3])
     target = {1: _with_philtrum(1, beyond, origin), 2: _with_philtrum(2, near, origin), 3: border, 4: red}
     for k, place in (*target.items(), (5, edge), (6, meet), (7, back)):
         x[ring[k]] = place
+    eager = np.interp(away, [0, 1, 2], [0.3, 0.8, 1])  # where rows crowd into the corner it would fold
     smooth = limit(layout.faces, layout.count)
-    for _ in range(6):
+    for _ in range(4):
         now = smooth @ x
         for k, place in target.items():
-            x[ring[k]] += place - now[ring[k]]
+            x[ring[k]] += eager[:, None] * _TRUE[k] * (place - now[ring[k]])
 
 
 def _with_philtrum(k, row, origin):

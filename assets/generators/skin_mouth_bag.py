@@ -6,13 +6,22 @@ import numpy as np
 from .skin_curves import even
 from .skin_layout import Layout
 
-#: Rings of the bag: half outline seen from the front, (x, z) mm from the middle above round the side to the middle
-#: below, z against the line of the lips; and y behind the back of the lips by x. The first turns from the lips' backs
+#: Rings of the bag: half outline seen from the front, (x, z) mm from the middle above to the side and from there to the
+#: middle below, z against the line of the lips; and y behind the back of the lips by x. The first turns from the lips' backs
 #: into roof and floor, the second lies at the molars, the third borders the back wall.
 _OUTLINES = {
-    8: [(0, 16.2), (10, 16.0), (18, 14.4), (24.5, 9.5), (27.0, 0), (25.8, -8), (20, -13.8), (10, -15.6), (0, -16.0)],
-    9: [(0, 16.6), (14, 16.4), (25, 14.2), (32, 8.0), (33.0, 0), (32, -8.5), (26, -16.5), (14, -19.5), (0, -20.3)],
-    10: [(0, 13.6), (12, 13.0), (22, 11.0), (28.5, 6.0), (29.5, -1), (28.5, -9), (22, -15), (12, -17), (0, -17.5)],
+    8: (
+        [(0, 16.2), (10, 16.0), (18, 14.4), (24.5, 9.5), (27.0, -1.6)],
+        [(27.0, -1.6), (25.8, -8.4), (20, -13.8), (10, -15.6), (0, -16.0)],
+    ),
+    9: (
+        [(0, 16.6), (14, 16.4), (25, 14.2), (32, 8.0), (33.0, -1.0)],
+        [(33.0, -1.0), (32, -9.0), (26, -16.5), (14, -19.5), (0, -20.3)],
+    ),
+    10: (
+        [(0, 13.6), (12, 13.0), (22, 11.0), (28.5, 6.0), (29.5, -1.5)],
+        [(29.5, -1.5), (28.5, -9), (22, -15), (12, -17), (0, -17.5)],
+    ),
 }
 _DEPTHS = {
     8: ([0, 8, 16, 24, 27], [2.2, 3.4, 8.0, 15.5, 17.5]),
@@ -28,7 +37,8 @@ def mouth_bag(layout: Layout, x: np.ndarray) -> None:
     ring = layout.rings["mouth"]
     middle, front = 0.5 * (x[ring[6][27], 2] + x[ring[6][11], 2]), x[ring[7][27], 1]
     for k, outline in _OUTLINES.items():
-        half = even(outline, 17)  # from the middle above (index 27) to the middle below (11)
+        above, below = (even(side, 9) for side in outline)
+        half = np.concatenate([above, below[1:]])  # from the middle above (index 27) to the middle below (11)
         around = np.zeros((32, 2))
         for step, place in enumerate(half):
             around[27 - step], around[(27 + step) % 32] = place, place * [-1, 1]
