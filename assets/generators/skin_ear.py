@@ -21,7 +21,7 @@ SIZE = 0.975
 STAND = 5.0
 
 #: How much of what subdivision rounds off the cage of rings 1.. gives back at each step.
-_CRISP = (0.0, 0.7, 0.8, 0.3, 0.5, 0.0, 0.0)
+_CRISP = (0.0, 0.7, 0.8, 0.4, 0.6, 0.0, 0.0)
 
 #: Skin around the ear that gives way when the root moves: within so many mm, seen from the side, of (y, z).
 _AROUND, _MIDDLE = 62.0, (9.0, 0.0)
