@@ -21,7 +21,7 @@ SIZE = 0.975
 STAND = 5.0
 
 #: How much of what subdivision rounds off the cage of rings 1.. gives back at each step.
-_CRISP = (0.0, 0.7, 0.8, 0.4, 0.6, 0.0, 0.0)
+_CRISP = (0.0, 0.7, 0.8, 0.45, 0.6, 0.0, 0.0)
 
 #: Skin around the ear that gives way when the root moves: within so many mm, seen from the side, of (y, z).
 _AROUND, _MIDDLE = 62.0, (9.0, 0.0)
@@ -46,7 +46,7 @@ def _around(layout: Layout, x: np.ndarray) -> np.ndarray:
     return np.flatnonzero(near & (x[:, 0] > 20) & ~inside)
 
 
-class _Side:
+class Side:
     """The head's side without the ear, x = f(y, z) mm, through the skin around the ear (thin-plate spline)."""
 
     def __init__(self, layout: Layout, x: np.ndarray):
@@ -57,7 +57,7 @@ class _Side:
         return np.column_stack([self._x(yz), yz])
 
 
-def _frame(side: _Side) -> tuple[np.ndarray, np.ndarray]:
+def frame(side: Side) -> tuple[np.ndarray, np.ndarray]:
     """Origin (3,) mm and rows (3, 3): the steps along p, q, h of the ear's frame."""
     flare, lean, tilt = np.radians([FLARE, LEAN, TILT])
     out = np.array([np.cos(flare) * np.cos(lean), -np.sin(flare) * np.cos(lean), -np.sin(lean)])
@@ -67,7 +67,7 @@ def _frame(side: _Side) -> tuple[np.ndarray, np.ndarray]:
     return side(np.zeros((1, 2)))[0] + [STAND, 0, 0], SIZE * np.array([p, q, out])
 
 
-def _move_root(layout: Layout, x: np.ndarray, side: _Side) -> None:
+def _move_root(layout: Layout, x: np.ndarray, side: Side) -> None:
     """Ring 0 goes to the root of the auricle; the skin around it follows evenly, sliding on the head."""
     root = layout.rings["ear_l"][0]
     inner = _around(layout, x)
@@ -87,10 +87,10 @@ def _move_root(layout: Layout, x: np.ndarray, side: _Side) -> None:
     x[root] = side(contour(ROOT))
 
 
-def _sculpt(layout: Layout, x: np.ndarray, side: _Side) -> tuple[np.ndarray, np.ndarray]:
+def _sculpt(layout: Layout, x: np.ndarray, side: Side) -> tuple[np.ndarray, np.ndarray]:
     """Vertices (k,) of the auricle and where (k, 3) mm its limit surface has them."""
     ring, patch = layout.rings["ear_l"], layout.patches["ear_l"]
-    origin, axes = _frame(side)
+    origin, axes = frame(side)
     size = ring.shape[1]
     index, target = [], []
     for k in range(1, len(ring)):
@@ -107,13 +107,13 @@ def _sculpt(layout: Layout, x: np.ndarray, side: _Side) -> tuple[np.ndarray, np.
 
 def place_ear(layout: Layout, x: np.ndarray) -> None:
     """Put the auricle on a head whose grid is placed (left side)."""
-    index, target = _sculpt(layout, x, _Side(layout, x))
+    index, target = _sculpt(layout, x, Side(layout, x))
     x[index] = target
 
 
 def finish_ear(layout: Layout, x: np.ndarray) -> None:
     """The auricle as sculpted, on the limit surface; its root where the sculpt leaves the head (left side)."""
-    side = _Side(layout, x)
+    side = Side(layout, x)
     _move_root(layout, x, side)
     index, target = _sculpt(layout, x, side)
     x[index] = target
