@@ -14,6 +14,7 @@ from .skin_lids import finish_lids
 from .skin_lips import finish_lips
 from .skin_mouth_bag import mouth_bag
 from .skin_nose import finish_nose
+from .skin_relief import raise_forms
 from .skin_shape import both_sides
 
 
@@ -49,7 +50,9 @@ def _against_rounding(layout: Layout, x: np.ndarray, strength: float = 0.5) -> n
 def finish_shape(layout: Layout, vertices: np.ndarray) -> np.ndarray:
     """(n, 3) mm: an averaged head made whole, exactly symmetric."""
     x = both_sides(_smooth_outside(layout, vertices)[layout.left])
-    x = both_sides(_against_rounding(layout, both_sides(x[layout.left]))[layout.left])
+    x = both_sides(_against_rounding(layout, x)[layout.left])
+    raise_forms(layout, x)
+    x = both_sides(x[layout.left])
     finish_ear(layout, x)
     finish_nose(layout, x)
     finish_lids(layout, x)
