@@ -36,6 +36,28 @@ def _smooth_outside(layout: Layout, x: np.ndarray) -> np.ndarray:
     return fair(layout, x, weight, 7.0)
 
 
+def _behind_ear(layout: Layout, x: np.ndarray) -> np.ndarray:
+    """The auricle pulls on the few vertices behind it: smooth there again."""
+    weight = np.zeros(layout.count)
+    for v in range(4, 20):
+        for u in range(17, HALF + 1):
+            near = layout.grid[v, [u % (2 * HALF), -u % (2 * HALF)]]
+            weight[near[near >= 0]] = np.interp(v, [3, 6, 17, 20], [0, 1, 1, 0]) * np.interp(u, [16, 18], [0, 1])
+    for side in ("_l", "_r"):
+        weight[layout.rings["ear" + side][0]] = 0
+    return fair(layout, x, weight, 13.0)
+
+
+def _even_edge(layout: Layout, x: np.ndarray, rounds: int = 4) -> np.ndarray:
+    """The bust ends in a line without waves, and so do the rows above it."""
+    x = x.copy()
+    for row, times in ((ROWS - 1, rounds), (ROWS - 2, rounds // 2)):
+        loop = layout.row(row)
+        for _ in range(times):
+            x[loop] = 0.5 * x[loop] + 0.25 * (np.roll(x[loop], 1, axis=0) + np.roll(x[loop], -1, axis=0))
+    return x
+
+
 def _against_rounding(layout: Layout, x: np.ndarray, strength: float = 0.5) -> np.ndarray:
     """The end of the nose, which was not fitted in detail, stands out by what subdivision will round off it."""
     weight = nose_end(layout).astype(float)[:, None]
@@ -49,11 +71,12 @@ def _against_rounding(layout: Layout, x: np.ndarray, strength: float = 0.5) -> n
 
 def finish_shape(layout: Layout, vertices: np.ndarray) -> np.ndarray:
     """(n, 3) mm: an averaged head made whole, exactly symmetric."""
-    x = both_sides(_smooth_outside(layout, vertices)[layout.left])
+    x = both_sides(_even_edge(layout, _smooth_outside(layout, vertices))[layout.left])
     x = both_sides(_against_rounding(layout, x)[layout.left])
     raise_forms(layout, x)
     x = both_sides(x[layout.left])
     finish_ear(layout, x)
+    x = both_sides(_behind_ear(layout, both_sides(x[layout.left]))[layout.left])
     finish_nose(layout, x)
     finish_lids(layout, x)
     finish_lips(layout, x)
