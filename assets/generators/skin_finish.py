@@ -7,6 +7,7 @@ All work in place on (n, 3) mm positions of the left side and the midline; `fini
 import numpy as np
 
 from ...sim.mesh_subdivision import limit
+from .skin_curves import lerp
 from .skin_ear import finish_ear
 from .skin_fit import fair, nose_end
 from .skin_layout import HALF, ROWS, Layout
@@ -78,6 +79,8 @@ def finish_shape(layout: Layout, vertices: np.ndarray) -> np.ndarray:
     finish_ear(layout, x)
     x = both_sides(_behind_ear(layout, both_sides(x[layout.left]))[layout.left])
     finish_nose(layout, x)
+    ring = layout.rings["eye_l"]
+    x[ring[1]] = lerp(x[ring[1]], x[ring[2]], 0.45)  # halves the way to the lids, whose rows lie close to the margins
     finish_lids(layout, x)
     finish_lips(layout, x)
     mouth_bag(layout, x)
