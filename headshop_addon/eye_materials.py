@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The eye's materials. All but the caruncle's read the attribute ``headshop_eye`` (`dress` in `materials.py` writes it): across the
-gaze, in iris radii, with the radius of the pupil as the third number, so they turn with the eye."""
+"""The eye's materials. All but the caruncle's read the attribute ``headshop_eye`` (`dress` in `materials.py` writes
+it): across the gaze, in iris radii, with the radius of the pupil as the third number, so they turn with the eye."""
 
 import bpy
 

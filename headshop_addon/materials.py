@@ -112,6 +112,7 @@ def eye_coordinates(mesh: Mesh, eye: Eye, up: np.ndarray) -> np.ndarray:
     side /= np.linalg.norm(side)
     offset = mesh.vertices - eye.centre
     flat = np.column_stack([offset @ side, offset @ np.cross(-gaze, side)])
+    flat[np.linalg.norm(flat, axis=1) < 1e-6] = 1e-6, 0.0  # the poles, too, lie to some side
     radius = np.linalg.norm(flat, axis=1)
     depth = offset @ gaze
     # behind the eye's equator go on outwards, so that veins do not return to the middle of the gaze

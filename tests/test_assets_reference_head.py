@@ -9,8 +9,8 @@ from headshop.assets.generators.make_reference_head import rounded
 from headshop.assets.generators.skin import make_skin
 from headshop.assets.generators.skin_layout import skin_layout
 from headshop.assets.generators.skin_norms import norms
-from headshop.sim.anatomy.head import PARTS, SKIN_GROUPS
 from headshop.sim.anatomy.eyeball import reach
+from headshop.sim.anatomy.head import PARTS, SKIN_GROUPS
 from headshop.sim.anatomy.landmark_names import SKIN, SKULL, mirrored
 from headshop.sim.anatomy.storage import load_head
 from headshop.sim.mesh import edges, vertex_normals

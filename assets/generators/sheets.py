@@ -157,6 +157,15 @@ class Sheets:
             rows.append(self._row(layers, target, 210, FOUR))
         return montage(rows)
 
+    def blink(self):
+        """The left eye open, half shut, shut, looking down, up and aside; from the front, the sides and below."""
+        rows = []
+        for blink, gaze in ((0, (0, 0)), (0.5, (0, 0)), (1, (0, 0)), (0, (0, -0.43)), (0, (0, 0.3)), (0, (0.6, 0))):
+            posed = plainly_posed(self.head, blink=blink, gaze=gaze)
+            layers = [skin_layer(posed.skin, levels=3), *eye_layers(posed)]
+            rows.append(self._row(layers, self.head.eyes[0].centre, 46, ((0, 0), (45, 0), (-35, 5), (10, -35))))
+        return montage(rows)
+
     def mouth(self):
         """The mouth opened by the jaw alone, a third, half and wide; pushed aside and forward."""
         target = self.lip_middle * [0, 1, 1] + [0, 8, -18]
@@ -178,7 +187,7 @@ class Sheets:
 
 SHEETS = (
     *("skin", "wire", "face", "facewire", "eye", "ear", "nose", "lips", "skull", "muscles", "rows", "tongue"),
-    *("eyeballs", "poses", "mouth", "landmarks", "texture"),
+    *("eyeballs", "blink", "poses", "mouth", "landmarks", "texture"),
 )
 
 

@@ -99,7 +99,7 @@ def skin_groups(layout: Layout, vertices: np.ndarray) -> dict[str, np.ndarray]:
             out[f"lid_{side}{s}"] = p.patch(
                 (p.ring("eye" + s, 1, 1, indices), 0.15), (p.ring("eye" + s, 2, 2, indices), 0.5),
                 (p.ring("eye" + s, 3, 3, indices), 0.85), (p.ring("eye" + s, 4, 7, indices), 1),
-                (p.ring("eye" + s, 2, 7, (2, 14)), 0.5), rounds=0,
+                (p.ring("eye" + s, 8, 8, indices), 0.6), (p.ring("eye" + s, 2, 7, (2, 14)), 0.5), rounds=0,
             )  # fmt: skip
         out["brow" + s] = p.patch((p.grid(2, 11, 4, 4, sides), 0.9), (p.grid(3, 11, 5, 5, sides), 1), rounds=2)
         out["cheek" + s] = p.patch((p.grid(6, 12, 11, 20, sides), 1), rounds=4)

@@ -59,10 +59,10 @@ LOWER_EDGE = [
 ]
 
 #: The lining turns back this far above and below the edges, degrees about the eye.
-FORNIX = 34
+FORNIX = 21
 
 #: Thickness of the lids at their edge, mm.
-THICKNESS = 1.7
+THICKNESS = 1.4
 
 
 def _column(count=24):
@@ -92,19 +92,24 @@ def finish_lids(layout: Layout, x: np.ndarray) -> None:
     front, on_ball = ring[2:7].ravel(), ring[6][inner >= 3]
     want = np.concatenate([goal[k] for k in range(2, 7)]) + centre
     firm = (
-        np.array([0.5, 0.8, 0.8, 0.9, 0.9])[:, None] * np.clip((np.minimum(inner, outer) - 0.4) / 2.6, 0, 1)
+        np.array([0.5, 0.8, 0.8, 0.75, 0.9])[:, None] * np.clip((np.minimum(inner, outer) - 0.4) / 2.6, 0, 1)
     ).reshape(-1, 1)
     rows = smooth[front]
     behind = np.unique(np.concatenate([ring[7], ring[8], patch[1, 1:-1]]))
-    lining = smooth[behind]
+    room = np.where(np.isin(behind, ring[7]), 0.36, 0.7)
+    lining, margin = smooth[behind], smooth[on_ball]
     for _ in range(24):
         x[front] += firm * (want - rows @ x) + 0.08 * (want - x[front])
-        x[on_ball] = _clear(x[on_ball] - centre, 0.22, 0.47) + centre
+        # cage and limit of the inner edge lie on either side of a quarter of a millimetre from the ball
+        edge = margin @ x - centre
+        stand = np.linalg.norm(edge, axis=1) - np.linalg.norm(_clear(edge, 0, 0), axis=1)
+        least = np.clip(0.46 - stand, 0.03, 0.43)
+        x[on_ball] = _clear(x[on_ball] - centre, least, least) + centre
         away = lining @ x - centre
-        x[behind] += _clear(away, 0.7, np.inf) - away
+        x[behind] += _clear(away, room, np.inf) - away
 
 
-def _clear(points: np.ndarray, least: float, most: float) -> np.ndarray:
+def _clear(points: np.ndarray, least, most) -> np.ndarray:
     """Points (k, 3) mm about the eye's centre, ``least`` to ``most`` mm in front of its surface."""
     far = np.linalg.norm(points, axis=1)
     surface = reach(BALL, np.arccos(np.clip(-points[:, 1] / far, -1, 1)))
@@ -169,11 +174,13 @@ def _lid_skin(rim, orbit, inner, outer, above):
         np.full(24, 0.22),
     )
     fold = over(
-        table([2, 2.3, 2.6, 2.9, 3.0, 2.9, 2.8, 2.8, 2.6], [4.5, 5, 5.8, 6.8, 7.1, 7.1, 6.6, 5.8, 5]),
-        table([3.2, 3.6, 4.2, 4.6, 4.7, 4.7, 4.3, 3.8, 3.2], [2.8, 3, 3.2, 3.5, 3.5, 3.5, 3.4, 3.2, 3]),
+        table([2, 2.3, 2.6, 2.9, 3.0, 3.1, 3.4, 3.5, 3.2], [4.5, 5, 5.8, 6.8, 7.1, 7.1, 6.6, 5.8, 5]),
+        table([3.2, 3.6, 4.2, 4.6, 4.7, 4.6, 3.8, 3.1, 2.6], [2.8, 3, 3.2, 3.5, 3.5, 3.4, 2.9, 2.5, 2.4]),
         np.full(24, 0.42),
     )
-    straight = np.clip((np.minimum(inner * np.where(above, 1, 0.7), 1.4 * outer) - 0.2) / 2.2, 0, 1)
+    straight = np.clip(
+        (np.minimum(inner * np.where(above, 1, 0.5), outer * np.where(above, 1.4, 0.8)) - 0.2) / 2.2, 0, 1
+    )
     out = []
     for shape, share in ((plate, 0.16), (crease, 0.38), (fold, 0.62)):
         out.append(lerp(lerp(rim, orbit, share), shape, straight))
@@ -187,7 +194,7 @@ def _cup(edge, inner, outer, above):
     angle = np.arctan2(edge[:, 2], -edge[:, 1]) + np.radians(FORNIX) * np.where(above, 1, -1) * np.clip(
         np.minimum(inner, outer) / 3, 0, 1
     )
-    depth = np.sqrt(np.maximum((RADIUS + 2.0) ** 2 - side**2, 16))
+    depth = np.sqrt(np.maximum((RADIUS + 1.1) ** 2 - side**2, 16))
     lining = np.stack([side, -depth * np.cos(angle), depth * np.sin(angle)], axis=1)
     corner = np.where((inner < outer)[:, None], [-14.2, -3.6, -2.0], [13.2, 1.0, -0.6])
     lining = lerp(corner, lining, ramp)

@@ -107,7 +107,7 @@ def build_lids(head: Head, layers: Layers, side: str) -> Lids | None:
     off = np.abs(elevation - np.where(upper, curves[0](within), curves[1](within)))
     weight = np.maximum(weight, np.clip(1.4 - off / 0.25, 0, 1) * ((within > a0) & (within < a1)))
     # the lining unfolds from the fornix as the lid goes
-    weight = np.where(inner, weight * np.clip(1.0 - 0.7 * off, 0.3, 1), weight)
+    weight = np.where(inner, weight * np.clip(1.1 - 0.55 * off, 0.3, 1), weight)
     profile_angle, profile = eye_profile(eye)
     distance = np.linalg.norm(v - eye.centre, axis=1)
     touching = np.flatnonzero((distance < 1.6 * eye.radius) & layers.free[: len(v)])
@@ -130,6 +130,7 @@ def build_lids(head: Head, layers: Layers, side: str) -> Lids | None:
         hold=weight**2 * np.where(inner, 0.5, 1.0),
         opening=opening,
         missing=missing,
+        middle=np.clip((1 - np.abs(across)) / 0.5, 0, 1),
         seal=np.zeros(len(column)),
         contact_column=touching,
         clearance=clearance,
@@ -247,9 +248,11 @@ def lid_targets(lids: Lids, upper: float, lower: float, gaze: np.ndarray) -> np.
     """
     down, rise = max(-float(gaze[1]), 0.0), max(float(gaze[1]), 0.0)
     travel = lids.opening + (_WAKE * lids.missing if upper < 0 else 0.0)
-    free = np.minimum(lids.opening / 0.5, 1)
-    turn_upper = -upper * (1 - LOWER_SHARE) * travel + free * (_FOLLOW[1] * rise - _FOLLOW[0] * down)
-    turn_lower = lower * LOWER_SHARE * lids.opening + free * (_FOLLOW[3] * rise - _FOLLOW[2] * down)
+    shut = np.clip(upper, 0, 1)
+    along = (1 - 0.6 * shut) * (_FOLLOW[3] * rise - _FOLLOW[2] * down)
+    follow = (1 - shut) * (_FOLLOW[1] * rise - _FOLLOW[0] * down) + shut * along
+    turn_upper = -upper * (1 - LOWER_SHARE) * travel + lids.middle * follow
+    turn_lower = lower * LOWER_SHARE * lids.opening + lids.middle * along
     # never past each other: the meeting line limits both, whichever way the eye looks
     closed = np.maximum(turn_lower - turn_upper, 1e-9)
     over = np.minimum(lids.opening / closed, 1.0)
@@ -262,14 +265,17 @@ def lid_targets(lids: Lids, upper: float, lower: float, gaze: np.ndarray) -> np.
     rest_size = np.linalg.norm(rest, axis=1)
     gap = rest_size - eyeball_radius(lids, lids.eye.centre + rest, np.zeros(2))
     # skin that hung in the fold is drawn flat over the ball
-    drawn = np.clip(-turn / 0.7, 0, 1) * (lids.upper & ~lids.inner) * np.clip(4 * lids.weight * (1 - lids.weight), 0, 1)
+    drawn = np.clip(-turn / np.maximum(0.8 * lids.opening, 0.1), 0, 1) * (lids.upper & ~lids.inner)
+    drawn = drawn * np.clip(4 * lids.weight * (1 - lids.weight), 0, 1)
     height = gap - drawn * np.maximum(gap - _TAUT - 6 * (1 - lids.weight) ** 3, 0)
     plane = np.cos(angle)[:, None] * lids.forward + np.sin(angle)[:, None] * lids.up
     target = lids.along[:, None] * lids.axis + lids.radius[:, None] * plane
     size = np.linalg.norm(target, axis=1)
     # near the ball, heights are over what lies below now
     under = eyeball_radius(lids, lids.eye.centre + target, gaze)
-    close = lids.weight * np.clip((5.0 - gap) / 2.5, 0, 1)
+    close = np.where(lids.inner, 1.0, lids.weight) * np.clip((5.0 - gap) / 2.5, 0, 1)
+    # a lining that is drawn out between margin and fornix stands off, or it would cut the corner
+    height = height + lids.inner * np.abs(turn) * (0.4 + 2.5 * (1 - lids.weight)) * (lids.weight < 0.99)
     want = size + close * (under + height - size) + (1 - close) * (height - gap)
     want = np.maximum(want, under + np.minimum(gap, 0.15))
     return lids.eye.centre + target * (want / np.maximum(size, 1e-9))[:, None]

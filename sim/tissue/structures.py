@@ -84,6 +84,7 @@ class Lids:
     hold (v,) share of the lid stiffness with which it is held to its place
     upper : (v,) bool; opening (v,) rad between the margins at the vertex's place;
     missing (v,) rad that a scan with closed eyes lacks to an open eye; inner (v,) bool: behind the margin
+    middle : (v,) 0 at the corners of the eye, 1 between them
     seal (v,) rad by which each lid goes on when closed, until the limit surfaces meet
     profile : (b,) eyeball radius over the angle from the gaze, `profile_angle` (b,)
     """
@@ -102,6 +103,7 @@ class Lids:
     hold: np.ndarray
     opening: np.ndarray
     missing: np.ndarray
+    middle: np.ndarray
     inner: np.ndarray
     seal: np.ndarray
     contact_column: np.ndarray
