@@ -12,7 +12,7 @@ from .skin_layout import skin_layout
 RADIUS = 12.0
 
 #: The inner edge of the margins stays this far in front of the eyeball, mm: the tear film's room.
-GAP = 0.415
+GAP = 0.41
 
 #: The eyeball about its centre.
 BALL = Eye(np.zeros(3), RADIUS, np.array([0.0, -1.0, 0.0]))

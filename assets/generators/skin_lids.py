@@ -62,7 +62,7 @@ LOWER_EDGE = [
 FORNIX = 21
 
 #: Thickness of the lids at their edge, mm.
-THICKNESS = 1.4
+THICKNESS = 1.3
 
 
 def _column(count=24):

@@ -18,7 +18,7 @@ from .structures import Lids
 #: Share of the opening that the lower lid covers in a blink (the upper lid does the rest).
 LOWER_SHARE = 0.12
 #: Closed lids press on each other, mm beyond the first touch of their limit surfaces.
-_SEAL = 0.04
+_SEAL = 0.03
 #: Share of a vertical gaze that the lids follow: (upper lid down, up; lower lid down, up).
 _FOLLOW = (0.75, 0.6, 0.3, 0.12)
 #: mm between skin and eyeball where the lid is taut.
