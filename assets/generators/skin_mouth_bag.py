@@ -1,48 +1,58 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The lining of the mouth: vestibule and hollow in one bag behind the lips."""
+"""The lining of the mouth as the mucosa runs: deep between lips and gums, over the ridges, to palate and floor."""
 
 import numpy as np
 
-from .skin_curves import even
+from ...sim.mesh_subdivision import limit
 from .skin_layout import Layout
 
-#: Rings of the bag: half outline seen from the front, (x, z) mm from the middle above to the side and from there to the
-#: middle below, z against the line of the lips; and y behind the back of the lips by x. The first turns from the lips' backs
-#: into roof and floor, the second lies at the molars, the third borders the back wall.
-_OUTLINES = {
-    8: (
-        [(0, 16.2), (10, 16.0), (18, 14.4), (24.5, 9.5), (27.0, -1.6)],
-        [(27.0, -1.6), (25.8, -8.4), (20, -13.8), (10, -15.6), (0, -16.0)],
-    ),
-    9: (
-        [(0, 16.6), (14, 16.4), (25, 14.2), (32, 8.0), (33.0, -1.0)],
-        [(33.0, -1.0), (32, -9.0), (26, -16.5), (14, -19.5), (0, -20.3)],
-    ),
-    10: (
-        [(0, 13.6), (12, 13.0), (22, 11.0), (28.5, 6.0), (29.5, -1.5)],
-        [(29.5, -1.5), (28.5, -9), (22, -15), (12, -17), (0, -17.5)],
-    ),
-}
-_DEPTHS = {
-    8: ([0, 8, 16, 24, 27], [2.2, 3.4, 8.0, 15.5, 17.5]),
-    9: ([0, 12, 24, 33], [25.0, 25.5, 28.0, 32.0]),
-    10: ([0, 30], [49.0, 49.0]),
-}
-#: mm by which the floor's front lies farther back than the roof's: the lower lip is thicker.
-_LOWER_BACK = {8: 4.5, 9: 0.0, 10: 0.0}
+#: Where the limit surface lies, (x, behind, above) mm against the middle of the line where the lips meet; from the
+#: middle sideways, the first eight over the mouth, then the corner's meridian, then eight under it. The second ring
+#: runs over the ridges 2.5 mm beyond the teeth's necks, outside of arches 60 mm wide at the molars.
+_UPPER = {
+    8: [(0, 6.8, 13.4), (6, 7.3, 13.4), (12, 9.9, 13.4), (17.5, 14.5, 13.2), (22.5, 20.5, 12.8), (27, 28, 11.6),
+        (30.5, 35, 9), (33, 39, 4)],
+    9: [(0, 13, 11.2), (6.5, 14, 11.2), (11.5, 17, 11.4), (16.5, 22, 12), (20.5, 30, 12.8), (24, 40, 13.3),
+        (29, 50, 12.5), (33.5, 55, 6.5)],
+    10: [(0, 32, 15), (5, 33, 15), (9.5, 36, 14.8), (13, 40, 14.6), (16.5, 46, 14.4), (20.5, 54, 14), (25.5, 61, 11.6),
+         (29.5, 64, 6)],
+}  # fmt: skip
+_CORNER = {8: (33.5, 38, -2.8), 9: (34.5, 56, 0.5), 10: (30, 64.5, 0.5)}
+_LOWER = {
+    8: [(0, 9.8, -13.2), (6, 10.5, -13.4), (12, 13.8, -13.6), (18, 19, -13.2), (23.5, 26, -12), (27.5, 32, -10.8),
+        (31, 37, -9), (33, 39.5, -6)],
+    9: [(0, 15.5, -10.8), (6.5, 16.5, -11), (12, 19.5, -11.8), (17, 24, -10), (21, 33, -8.3), (24.5, 43, -6.7),
+        (29, 52, -5.2), (33.5, 56, -3.3)],
+    10: [(0, 31, -17), (5, 32, -17), (9.5, 35, -16.8), (13, 40, -16.4), (16, 46, -15.5), (19.5, 53, -13.5), (25, 61, -9),
+         (29.5, 64, -4.5)],
+}  # fmt: skip
+
+#: mm behind the line: the middle of the back wall.
+_BACK = 66.0
 
 
 def mouth_bag(layout: Layout, x: np.ndarray) -> None:
-    """Behind the lips up and down over the gums, wide past the molars, 46 mm deep."""
-    ring = layout.rings["mouth"]
-    middle, front = 0.5 * (x[ring[6][27], 2] + x[ring[6][11], 2]), x[ring[7][27], 1]
-    for k, outline in _OUTLINES.items():
-        above, below = (even(side, 9) for side in outline)
-        half = np.concatenate([above, below[1:]])  # from the middle above (index 27) to the middle below (11)
-        around = np.zeros((32, 2))
-        for step, place in enumerate(half):
-            around[27 - step], around[(27 + step) % 32] = place, place * [-1, 1]
-        y = front + np.interp(abs(around[:, 0]), *_DEPTHS[k]) + _LOWER_BACK[k] * np.clip(-around[:, 1] / 12, 0, 1)
-        x[ring[k]] = np.stack([around[:, 0], y, middle + around[:, 1]], axis=1)
-    patch = layout.patches["mouth"]
-    x[patch[1, 1:-1]] = 0.5 * (x[patch[0, 1:-1]] + x[patch[2, 1:-1]]) + [0, 2, 0]
+    """Rings 8 to 10 of the mouth and the patch that closes it, behind lips already finished."""
+    ring, patch = layout.rings["mouth"], layout.patches["mouth"]
+    line = 0.5 * (x[ring[6][27]] + x[ring[6][11]])
+    targets = []
+    for k, upper in _UPPER.items():
+        around = np.empty((32, 3))
+        for step, (above, below) in enumerate(zip(upper, _LOWER[k], strict=True)):
+            around[27 - step], around[11 + step] = above, below
+            around[(27 + step) % 32], around[11 - step] = above * _FLIP, below * _FLIP
+        around[19], around[3] = _CORNER[k], _CORNER[k] * _FLIP
+        targets.append((ring[k], line + around))
+    back = 0.5 * (targets[-1][1][(np.arange(21, 34) % 32)[::-1]] + targets[-1][1][np.arange(5, 18)])
+    back[:, 1:] = line[1:] + np.stack([_BACK - 1.5 * (back[:, 0] / 26) ** 2, np.zeros(13)], axis=1)
+    targets.append((patch[1, 1:-1], back))
+    for vertices, place in targets:
+        x[vertices] = place
+    smooth = limit(layout.faces, layout.count)
+    for _ in range(4):
+        now = smooth @ x
+        for vertices, place in targets:
+            x[vertices] += 0.8 * (place - now[vertices])
+
+
+_FLIP = np.array([-1.0, 1.0, 1.0])
