@@ -202,25 +202,64 @@ def test_feature_mesh_uses_all_landmarks_without_folds(head):
     assert (outward > 0).all()
 
 
-def test_texture_coordinates_fill_the_square_once(head):
+def overlaps(corners):
+    """Pairs of triangles (t, 3, 2), counter-clockwise, whose interiors meet: no edge of either separates them."""
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    first = np.floor(low * 64).astype(int)
+    size = np.floor(high * 64).astype(int) - first + 1
+    count = size.prod(axis=1)
+    owner = np.repeat(np.arange(len(corners)), count)
+    rank = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
+    key = (first[owner, 0] + rank % size[owner, 0]) * 1000 + first[owner, 1] + rank // size[owner, 0]
+    order = np.argsort(key, kind="stable")
+    key, owner = key[order], owner[order]
+    pairs, ahead = [], 1
+    while (same := key[ahead:] == key[:-ahead]).any():
+        pairs.append(np.stack([owner[:-ahead][same], owner[ahead:][same]], axis=1))
+        ahead += 1
+    a, b = np.unique(np.sort(np.concatenate(pairs), axis=1), axis=0).T
+    apart = ((low[a] >= high[b]) | (low[b] >= high[a])).any(axis=1)
+    for one, two in ((a, b), (b, a)):
+        for k in range(3):
+            start = corners[one][:, k]
+            edge = corners[one][:, (k + 1) % 3] - start
+            to = corners[two] - start[:, None]
+            apart |= (edge[:, None, 0] * to[..., 1] - edge[:, None, 1] * to[..., 0] <= 1e-9).all(axis=1)
+    return np.stack([a[~apart], b[~apart]], axis=1)
+
+
+def areas(triangles):
+    """Signed areas of (t, 3, 2)."""
+    ab, ac = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
+    return 0.5 * (ab[:, 0] * ac[:, 1] - ab[:, 1] * ac[:, 0])
+
+
+def test_texture_coordinates_never_overlap_and_are_symmetric(head, layout):
     uv = head.skin.uv.astype(float)
     assert uv.min() >= 0 and uv.max() <= 1
     corners = np.concatenate([uv[:, [0, 1, 2]], uv[:, [0, 2, 3]]])
-    ab, ac = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    area = 0.5 * (ab[:, 0] * ac[:, 1] - ab[:, 1] * ac[:, 0])
-    assert (area > 0).all()
-    # drawn on a raster every texel is hit once: the union covers as much as the triangles' areas add up to
-    size = 1024
-    hits = np.zeros((size, size), dtype=np.int16)
-    for tri in corners * size:
-        low, high = np.floor(tri.min(0)).astype(int), np.ceil(tri.max(0)).astype(int)
-        x, y = np.meshgrid(np.arange(low[0], high[0]) + 0.5, np.arange(low[1], high[1]) + 0.5)
-        inside = np.ones(x.shape, dtype=bool)
-        for k in range(3):
-            p, q = tri[k], tri[(k + 1) % 3]
-            inside &= (q[0] - p[0]) * (y - p[1]) - (q[1] - p[1]) * (x - p[0]) > 0
-        hits[low[1] : high[1], low[0] : high[0]] += inside
-    assert (hits > 1).sum() <= 0.001 * (hits > 0).sum()
+    assert (areas(corners) > 0).all()
+    assert len(overlaps(corners)) == 0
+    shifted = corners.copy()
+    shifted[0] += 0.02
+    assert len(overlaps(shifted)) > 0, "an overlap is found when there is one"
+    half = len(uv) // 2
+    np.testing.assert_allclose(uv[half:], uv[:half][:, [0, 3, 2, 1]] * [-1, 1] + [1, 0], atol=1e-6)
+
+
+def test_texture_is_dense_on_the_face(head):
+    uv, faces = head.skin.uv.astype(float), head.skin.faces
+    v = head.skin.vertices
+    flat = areas(uv[:, [0, 1, 2]]) + areas(uv[:, [0, 2, 3]])
+    real = 0.5 * np.linalg.norm(np.cross(v[faces[:, 2]] - v[faces[:, 0]], v[faces[:, 3]] - v[faces[:, 1]]), axis=1)
+    density = np.sqrt(flat / real)
+    seen = (head.groups["inner"][faces] < 0.5).all(axis=1)
+    face = seen & (head.groups["face"][faces] > 0.9).all(axis=1)
+    rest = seen & (head.groups["face"][faces] < 0.1).all(axis=1)
+    assert np.median(density[face]) > 1.2 * np.median(density[rest])
+    spread = density[face] / np.median(density[face])
+    assert np.percentile(spread, 5) > 0.6 and np.percentile(spread, 95) < 1.5
+    assert flat.sum() > 0.6, "the square is well filled"
 
 
 def test_measurements_are_those_of_an_adult(head):

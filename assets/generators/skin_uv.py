@@ -11,7 +11,7 @@ from .skin_layout import HALF, Layout
 from .uv_relax import mean_value, relax
 
 #: Hole -> ring along which its lining is cut off as an island of its own.
-CUPS = {"mouth": 7, "eye_l": 6, "eye_r": 6, "nostril_l": 1, "nostril_r": 1}
+CUPS = {"mouth": 6, "eye_l": 6, "eye_r": 6, "nostril_l": 1, "nostril_r": 1}
 
 #: Height of the strip at the bottom that holds the linings.
 STRIP = 0.15
@@ -70,8 +70,8 @@ def _left_half(layout: Layout, vertices: np.ndarray, faces: np.ndarray) -> np.nd
     gain = (1 + (FACE_GAIN - 1) * forward) * below
     gain[np.isin(triangles, layout.rings["ear_l"][1:]).any(axis=1)] *= EAR_GAIN
     weight = np.ones(len(triangles))  # openings take the shape that suits their surroundings
-    weight[2 * len(faces) :] = 0.03
-    weight[len(triangles) - len(lips) :] = 0.003
+    weight[2 * len(faces) :] = 0.1
+    weight[len(triangles) - len(lips) :] = 0.03
     return relax(points, triangles, flat, gain, weight, np.intersect1d(on_line, np.unique(triangles)))
 
 
