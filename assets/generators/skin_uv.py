@@ -17,7 +17,7 @@ CUPS = {"mouth": 6, "eye_l": 6, "eye_r": 6, "nostril_l": 1, "nostril_r": 1}
 STRIP = 0.15
 
 #: Texels per mm on the face compared with the back of the head.
-FACE_GAIN = 2.0
+FACE_GAIN = 2.4
 
 #: The same on the auricle, whose folds would shrink otherwise.
 EAR_GAIN = 1.35
@@ -66,10 +66,10 @@ def _left_half(layout: Layout, vertices: np.ndarray, faces: np.ndarray) -> np.nd
     flat = mean_value(points, triangles, np.array(list(outline)), np.array(list(outline.values())))
     on_line = np.unique(np.r_[front, below])
     forward = np.clip(-points[triangles].mean(axis=1)[:, 1] / 60 + 0.2, 0, 1)
-    below = np.interp(points[triangles].mean(axis=1)[:, 2], [-150, -100], [BUST_GAIN, 1])
-    gain = (1 + (FACE_GAIN - 1) * forward) * below
+    trunk = np.interp(points[triangles].mean(axis=1)[:, 2], [-150, -100], [BUST_GAIN, 1])
+    gain = (1 + (FACE_GAIN - 1) * forward) * trunk
     gain[np.isin(triangles, layout.rings["ear_l"][1:]).any(axis=1)] *= EAR_GAIN
-    weight = np.ones(len(triangles))  # openings take the shape that suits their surroundings
+    weight = 1 + 3 * forward  # openings take the shape that suits their surroundings
     weight[2 * len(faces) :] = 0.1
     weight[len(triangles) - len(lips) :] = 0.03
     return relax(points, triangles, flat, gain, weight, np.intersect1d(on_line, np.unique(triangles)))
