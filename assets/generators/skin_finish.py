@@ -14,6 +14,7 @@ from .skin_layout import HALF, ROWS, Layout
 from .skin_lids import finish_lids
 from .skin_lips import finish_lips
 from .skin_mouth_bag import mouth_bag
+from .skin_neck import finish_neck
 from .skin_nose import finish_nose
 from .skin_relief import raise_forms
 from .skin_shape import both_sides
@@ -79,6 +80,7 @@ def finish_shape(layout: Layout, vertices: np.ndarray) -> np.ndarray:
     finish_ear(layout, x)
     x = both_sides(_behind_ear(layout, both_sides(x[layout.left]))[layout.left])
     finish_nose(layout, x)
+    finish_neck(layout, x)
     ring = layout.rings["eye_l"]
     x[ring[1]] = lerp(x[ring[1]], x[ring[2]], 0.45)  # halves the way to the lids, whose rows lie close to the margins
     finish_lids(layout, x)
