@@ -113,7 +113,7 @@ class Sheets:
 
     def ear(self):
         """The left ear."""
-        target = (self.marks["t_l"] + self.marks["sa_l"]) / 2
+        target = (self.marks["sa_l"] + self.marks["sba_l"]) / 2
         return self._close(target, 85, ((90, 0), (50, 0), (140, 5), (100, 35)))
 
     def nose(self):
