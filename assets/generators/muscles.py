@@ -1,23 +1,29 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The muscles of face and jaw of ``assets/tables/muscles.csv``, laid into the soft tissue of the reference head."""
+"""The muscles of face and jaw of ``assets/tables/muscles.csv``, laid into the soft tissue of the reference head.
+
+Each is a grid painted on the skin (`muscles_points`), dropped to its depth (`muscles_room`), deepest first, so that it
+slides over those below (`muscles_layers`); muscles that merge end in the same nodes.
+"""
 
 import csv
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from ...sim.anatomy.head import Eye, Jaw, Muscle
-from ...sim.anatomy.muscle_shape import Room, muscle_shape
+from ...sim.anatomy.muscle_room import Room
+from ...sim.anatomy.muscle_shape import half_thickness, muscle_shape
 from ...sim.mesh import Mesh
-from .muscles_points import left_points, path, point
+from .muscles_layers import MERGE, Layers
+from .muscles_points import BROW, BROW_NODES, MODIOLUS_NODES, grid_rows, left_points, point, shared_ends
+from .muscles_rings import lid_rings, lip_arcs, orbital_rings
 from .muscles_room import Tissue, evened
 from .skull_depth import BoneSpace
 from .skull_field import curve
 
 TABLE = Path(__file__).resolve().parents[1] / "tables" / "muscles.csv"
-
-#: Points of a fibre, and of a ring.
-POINTS, RING_POINTS = 12, 24
+MIRROR = np.array([-1.0, 1.0, 1.0])
 
 
 def rows() -> list[dict[str, str]]:
@@ -42,186 +48,199 @@ def make_muscles(
     space = BoneSpace(skin, groups, landmarks)
     space.targets.update(skull_landmarks)
     bones = [parts["skull"], parts["mandible"]]
-    maker = _Maker(skin, groups, space, bones, eyes[0])
-    return tuple(muscle for row in rows() for muscle in maker.muscles(row))
+    maker = _Maker(skin, groups, space, bones, eyes)
+    table = rows()
+    made = {row["name"]: maker.muscles(row) for row in sorted(table, key=lambda row: float(row["level"]))}
+    return tuple(muscle for row in table for muscle in made[row["name"]])
 
 
 class _Maker:
-    def __init__(self, skin, groups, space, bones, eye):
-        self.points = left_points(space, eye)
-        self.skin, self.groups, self.eye = skin, groups, eye
-        self.tissue = Tissue(space, bones, skin, np.asarray(groups["inner"]) > 0.5)
-        self.room = Room(skin, bones, np.asarray(groups["inner"]) > 0.5)
+    def __init__(self, skin, groups, space, bones, eyes):
+        self.eye = eyes[0]
+        self.points = left_points(space, self.eye)
+        self.room = Room(skin, bones, np.asarray(groups["inner"]) > 0.5, [(e.centre, e.radius) for e in eyes])
+        self.tissue = Tissue(self.room, skin, groups)
+        self.points.update(self.tissue.lower_end())
+        self.layers = Layers(self.room)
+        self.bones = dict(zip(("skull", "mandible"), self.room.bones, strict=True))
+        self.palpebral = None
+        self._shared_nodes()
+
+    def _shared_nodes(self):
+        """Where muscles grow into each other: the knot beside the mouth corner and the line under the eyebrow."""
+        p = self.points
+        knot = p["k:ch"] + np.array([8.5, 5.0, -1.5]) + np.linspace(4.4, -4.4, MODIOLUS_NODES)[:, None] * [0, 0, 1]
+        brow = curve([point(text, p) for text in BROW], BROW_NODES)
+        glabella = np.array([p["k:g"] + [0, 0, 4.0]])
+        for name, line, share in (("modiolus", knot, 0.5), ("brow", brow, 0.5), ("glabella", glabella, 0.5)):
+            foot, normal = self.tissue.foot(line)
+            if name == "glabella":
+                foot, normal = foot * [0, 1, 1], normal * [0, 1, 1]
+            deep = np.clip(share * self.tissue.thickness(foot, normal), 1.5, 5.0)
+            for k, at in enumerate(self.room.fitted(foot - deep[:, None] * normal)):
+                p[f"m:{name}{k}" if len(line) > 1 else f"m:{name}"] = at
+                p[f"m:r{name}{k}"] = at * MIRROR
 
     def muscles(self, row):
         """One muscle, or the left and the right one."""
-        fibres, centre = self.fibres(row)
         ring = row["path"].startswith(("ring", "lids"))
-        make = self._muscle(row, ring)
-        if row["paired"] != "1":
-            fibres = (fibres + _mirrored_middle(fibres, row)) / 2
-            yield make(row["name"], fibres, centre)
-            return
-        yield make(row["name"] + "_l", fibres, centre)
-        yield make(row["name"] + "_r", fibres * [-1, 1, 1], None if centre is None else centre * [-1, 1, 1])
-
-    def _muscle(self, row, ring):
+        paired = row["paired"] == "1"
+        fibres, keep, centre = self.fibres(row)
+        if not paired:
+            fibres, keep = _symmetric(fibres, row), np.minimum(keep, _mirrored(keep[..., None], row)[..., 0])
+        half, clear = self._half(row, fibres, ring)
+        level = float(row["level"])
+        fibres = self.layers.settled(fibres, half, level, keep, clear, ring)
+        if not paired:
+            fibres = _symmetric(fibres, row)
+        shape = self._shape(row, fibres, keep, ring, level)
+        self.layers.add(level, shape, paired)
         width, thickness = float(row["width_mm"]), float(row["thickness_mm"])
+        muscle = Muscle(row["name"], row["kind"], fibres, width, thickness, float(row["max_shortening"]),
+                        row["origin_part"], row["insertion_part"], shape, ring, centre)  # fmt: skip
+        self._name_nodes(row, fibres)
+        return [replace(muscle, name=row["name"] + "_l"), _other_side(muscle)] if paired else [muscle]
 
-        def make(name, fibres, centre):
-            shape = muscle_shape(fibres, width, thickness, ring, self.room)
-            return Muscle(name, row["kind"], fibres, width, thickness, float(row["max_shortening"]),
-                          row["origin_part"], row["insertion_part"], shape, ring, centre)  # fmt: skip
+    def _half(self, row, fibres, ring):
+        """(f, p) mm of belly to either side of a fibre's points, and what of it must stay clear of bone."""
+        columns, points = 2 * len(fibres) - 1, fibres.shape[1]
+        sheet = np.empty((columns, 2 * points if ring else 2 * points - 1, 3))
+        half = half_thickness(sheet, float(row["width_mm"]), float(row["thickness_mm"]), ring, _profile(row))[::2, ::2]
+        half[[0, -1]] = 0.6 * half[[1, -2]]
+        clear = 0.9 * half
+        if not ring:  # where a muscle springs from bone its sheet lies on it
+            rise = np.clip(np.linspace(0, 1, points) / 0.22, 0, 1)
+            if row["origin_part"] != "soft":
+                clear = clear * rise
+            if row["insertion_part"] != "soft":
+                clear = clear * rise[::-1]
+        return half, clear + 0.15
 
-        return make
+    def _shape(self, row, fibres, keep, ring, level):
+        width, thickness = float(row["width_mm"]), float(row["thickness_mm"])
+        shape = muscle_shape(fibres, width, thickness, ring, self.room, _profile(row))
+        columns = 2 * len(fibres) - 1
+        stations = len(shape.vertices) // (2 * columns - 2)
+        fade = keep.min(axis=0)
+        fade = np.interp(np.arange(stations) / stations * len(fade), np.arange(len(fade)), fade)
+        for _ in range(2):
+            shape = self.layers.undercut(shape, columns, stations, level, fade)
+            shape = shape.moved(self.room.fitted(shape.vertices))
+        if row["paired"] == "1":
+            return shape
+        rings = shape.vertices.reshape(stations, 2 * columns - 2, 3)
+        if row["kind"] == "sphincter":
+            other = rings[::-1]
+        else:
+            turn = np.concatenate([np.arange(columns)[::-1], np.arange(columns, 2 * columns - 2)[::-1]])
+            other = rings[:, turn]
+        return shape.moved(((rings + other * MIRROR) / 2).reshape(-1, 3))
+
+    def _name_nodes(self, row, fibres):
+        """Let others end in this muscle: the lips' fibres and the outermost of the lids' rings."""
+        if row["path"].startswith("arc"):
+            inside = fibres[-2, fibres.shape[1] // 2 :]
+            self.points.update({f"m:{row['name'].split('_')[-1]}{k}": at for k, at in enumerate(inside)})
+        elif row["path"].startswith("lids"):
+            self.palpebral = fibres[0]
 
     def fibres(self, row):
-        """Fibres (f, p, 3) of the left or the middle muscle and the centre a sphincter pulls to (or None)."""
+        """Fibres (f, p, 3), how free each point is (f, p) (0 at shared nodes) and the centre of a sphincter (or None)."""
         text, count = row["path"], int(row["fibres"])
-        if text.startswith("ring"):
-            return self._orbital_ring(text, count, float(row["depth"]))
+        front = self.eye.centre + [0, -self.eye.radius, 0]
         if text.startswith("lids"):
-            return self._lid_ring(text, count, float(row["depth"]))
+            rings = lid_rings(text, count, self.points, self.eye)
+            return rings, np.ones(rings.shape[:2]), front
+        if text.startswith("ring"):
+            rings = orbital_rings(text, count, self.points, self.palpebral, self.tissue, float(row["depth"]))
+            keep = np.tile(np.linspace(1, 0, count)[:, None] ** 0.5, (1, rings.shape[1]))
+            return rings, keep, front
         if text.startswith("arc"):
-            return self._lip_arc(text, count)
-        corners = path(text, self.points)
-        deep = row["depth"].split()
-        on_skin = deep[0] not in ("deep", "temple", "cheek")
-        if on_skin:
-            corners = self.tissue.foot(corners.reshape(-1, 3))[0].reshape(corners.shape)
-        lines = np.stack([curve(side, POINTS) for side in corners])
-        share = np.linspace(0, 1, count)[:, None, None]
-        fibres = lines[0] * (1 - share) + lines[1] * share
-        if not on_skin:
-            return self._deep(fibres, row, deep[0]), None
-        depth = np.interp(np.linspace(0, 1, POINTS), np.linspace(0, 1, len(deep)), [float(d) for d in deep])
-        placed = self.tissue.laid(fibres, depth)
-        if "m:modiolus" in text.split(">")[-1]:
-            placed[:, -1] = self.points["m:modiolus"]
-        return self._within(evened(placed, 2), 0.4), None
+            arcs = lip_arcs(text, count, self.points, self.tissue, float(row["depth"]))
+            return arcs, _fading(arcs, True, True), self.points["k:sto"] + [0.0, 4.0, 0.0]
+        return *self._grid(row, text, count), None
 
-    def _deep(self, fibres, row, kind):
-        """Muscles that follow bone, not skin: their paths are true in space, only kept out of the bone."""
-        fibres = fibres.copy()
-        if kind == "temple":  # fan on the side of the skull, narrowing to the coronoid process under the arch
-            fibres = self._fan(fibres)
-        clear = {"temple": 2.5, "cheek": 2.0, "deep": 0.35 * float(row["thickness_mm"])}[kind]
-        for _ in range(3):
-            inner = fibres[:, 1:-1]
-            shape = inner.shape
-            fibres[:, 1:-1] = self.tissue.out_of_bone(inner.reshape(-1, 3), clear).reshape(shape)
-            fibres = evened(fibres, 2)
-        return self._within(fibres, 0.3)
+    def _grid(self, row, text, count):
+        steps = int(row["steps"])
+        corners = grid_rows(text, self.points, count)
+        lines = np.stack([curve(corners[:, k], steps) for k in range(count)])
+        tokens = row["depth"].split()
+        if tokens == ["deep"]:
+            placed = lines
+        else:
+            feet, normal, deep = self.tissue.painted(lines)
+            half = self._half(row, lines, False)[0]
+            depth = {"on": deep - half - 0.2, "root": deep - 0.1}
+            stations = np.linspace(0, len(tokens) - 1, steps)
+            placed = np.zeros_like(lines)
+            for k, token in enumerate(tokens):
+                share = np.clip(1 - np.abs(stations - k), 0, 1)[None, :, None]
+                if token == "free":
+                    placed += share * lines
+                    continue
+                down = depth[token] if token in depth else np.maximum(float(token) * deep, half + 0.8)
+                placed += share * (feet - down[..., None] * normal)
+        placed = self._rooted(placed, row)
+        nodes = shared_ends(text, count)
+        keep = np.ones(lines.shape[:2])
+        fade = np.clip((np.linspace(0, 1, steps) - 0.55) / 0.45, 0, 1)[:, None] ** 2
+        for k, name in enumerate(nodes):
+            if name is not None:
+                placed[k] += fade * (self.points[name] - placed[k, -1])
+                placed[k, -1] = self.points[name]
+        if any(nodes):
+            keep = _fading(placed, False, True)
+            keep[[k for k, name in enumerate(nodes) if name is None]] = 1.0
+        return placed, keep
 
-    def _fan(self, fibres):
-        """Origins along the temporal line: an arc from beside the brow over the temple to behind the ear."""
-        count = len(fibres)
-        p = self.points
-        front, rear = fibres[0, 0], fibres[-1, 0]
-        high = (front + rear) / 2 + np.array([6.0, 0.0, 34.0])
-        origin = curve(
-            [front, front * 0.55 + high * 0.45 + [2, -4, 8], high, rear * 0.55 + high * 0.45 + [2, 6, 10], rear], count
-        )
-        gate = np.array([p["s:coronoid"] + [3.0, 0.0, 14.0], p["s:coronoid"] + [4.0, 10.0, 14.0]])
-        share = np.linspace(0, 1, count)[:, None]
-        gate = gate[:1] * (1 - share) + gate[1:] * share
-        end = fibres[:, -1]
-        out = np.stack(
-            [curve([origin[k], (origin[k] + gate[k]) / 2 + [5, 0, 2], gate[k], end[k]], POINTS) for k in range(count)]
-        )
-        foot, normal = self.tissue.foot(out[:, 0])
-        deep = 0.9 * self.tissue.thickness(foot, normal, lining=False)
-        out[:, 0] = foot - deep[:, None] * normal
-        return evened(out, 1, ends=False)
-
-    def _within(self, fibres, clear):
-        """Last word: out of the bone, under the skin."""
-        flat = fibres.reshape(-1, 3)
-        ends = np.zeros(fibres.shape[:2], bool)
-        ends[:, [0, -1]] = True
-        moved = flat
-        for _ in range(3):
-            moved = self.tissue.out_of_bone(moved, clear)
-            moved = self.tissue.under_skin(self.tissue.off_lining(moved, 0.6), 1.0)
-        out = moved.reshape(fibres.shape)
-        same = np.linalg.norm(fibres[:, -1] - fibres[:1, -1], axis=-1).max() < 1e-9
-        if same:
-            out[:, -1] = out[:, -1].mean(axis=0)
-        return out
-
-    def _orbital_ring(self, text, count, depth):
-        """Concentric rings about the eye: half widths to the side, above, below, from the outer to the inner ring."""
-        outer, inner = (np.array([float(x) for x in part.split(",")]) for part in text[5:-1].split(";"))
-        turn = 2 * np.pi * np.arange(RING_POINTS) / RING_POINTS
-        c, s = np.cos(turn), np.sin(turn)
-        centre = (self.points["k:en"] + self.points["k:ex"]) / 2
-        lid = np.array([centre[0], 0, centre[2]])
-        nose = centre[0] - 6.5
-        rings = []
-        for share in np.linspace(0, 1, count):
-            side, above, below = outer * (1 - share) + inner * share
-            x = np.where(c > 0, side * c, min(side, nose - 1.5 * share) * c)
-            z = np.where(s > 0, above * s, below * s)
-            rings.append(np.stack([lid[0] + x, centre[1] - 6 + np.where(c > 0, 12 * c**2, 0), lid[2] + z], axis=1))
-        rings = np.array(rings)
-        closed = np.concatenate([rings, rings[:, :2]], axis=1)
-        placed = self.tissue.laid(closed, np.full(closed.shape[1], depth))[:, 1:-1]
-        placed = np.roll(placed, 1, axis=1)
-        placed = _smoothed_ring(placed, 2)
-        return self._within(placed, 0.4), self.eye.centre + [0, -self.eye.radius, 0]
-
-    def _lid_ring(self, text, count, depth):
-        """Rings in the lids: from ``near`` to ``far`` mm beyond the opening, on the eyeball where lids lie on it."""
-        near, far = (float(x) for x in text[5:-1].split(";"))
-        en, ex, ps, pi = (self.points[f"k:{n}"] for n in ("en", "ex", "ps", "pi"))
-        turn = 2 * np.pi * np.arange(RING_POINTS) / RING_POINTS
-        c, s = np.cos(turn), np.sin(turn)
-        middle = (en + ex) / 2
-        rings = []
-        for beyond in np.linspace(far, near, count):
-            half = (ex[0] - en[0]) / 2 + min(beyond, 4.0)
-            above, below = ps[2] - middle[2] + beyond, middle[2] - pi[2] + beyond
-            x, z = middle[0] + half * c, middle[2] + np.where(s > 0, above * s, below * s)
-            slope = (ex[2] - en[2]) / (ex[0] - en[0])
-            radius = self.eye.radius + 1.3
-            off = np.hypot(x - self.eye.centre[0], z - self.eye.centre[2])
-            ball = self.eye.centre[1] - np.sqrt(np.maximum(radius**2 - off**2, 0))
-            y = np.where(off < radius * 0.93, ball, np.interp(x, [en[0], ex[0]], [en[1] + 3, ex[1] + 3]))
-            rings.append(np.stack([x, y, z + slope * (x - middle[0])], axis=1))
-        rings = _smoothed_ring(np.array(rings), 2)
-        flat = rings.reshape(-1, 3)
-        for _ in range(3):
-            flat = self.tissue.off_lining(self.tissue.under_skin(flat, 1.0), 0.3)
-        return flat.reshape(rings.shape), self.eye.centre + [0, -self.eye.radius, 0]
-
-    def _lip_arc(self, text, count):
-        """Arcs from the right modiolus to the left one, between the red of the lip and its far edge."""
-        first, last = (point(p, self.points) for p in text[4:-1].split(";"))
-        end = self.points["m:modiolus"]
-        corner = self.points["k:ch"]
-        fibres = []
-        for share in np.linspace(0, 1, count):
-            middle = first * (1 - share) + last * share
-            rise = middle[2] - corner[2]
-            side = np.array([corner[0] * 0.5, corner[1] * 0.35 + middle[1] * 0.65, corner[2] + 0.97 * rise])
-            near = corner + np.array([0.5 + 3.5 * share, 2.0, 0.62 * rise])
-            left = curve([middle, side, near, end], 9)
-            fibres.append(np.concatenate([left[::-1] * [-1, 1, 1], left[1:]]))
-        fibres = np.array(fibres)
-        placed = self.tissue.laid(fibres, np.full(fibres.shape[1], 0.55))
-        placed[:, 0], placed[:, -1] = end * [-1, 1, 1], end
-        placed = evened(placed, 2)
-        placed = self._within((placed + placed[:, ::-1] * [-1, 1, 1]) / 2, 0.4)
-        return (placed + placed[:, ::-1] * [-1, 1, 1]) / 2, self.points["k:sto"] + [0.0, 4.0, 0.0]
+    def _rooted(self, fibres, row, reach=14.0):
+        """Fibres whose ends on bone are brought onto it where they hang more than some mm before it."""
+        for part, end in ((row["origin_part"], 0), (row["insertion_part"], -1)):
+            if part not in self.bones:
+                continue
+            bone = self.bones[part]
+            at = fibres[:, end]
+            _, _, far = bone.height(at, reach)
+            shift = np.where((np.isfinite(far) & (far > 3.0))[:, None], bone.nearest(at) - at, 0.0)
+            shift = evened(shift[:, None], 2)[:, 0] if len(shift) > 2 else shift
+            fade = np.clip(1 - np.linspace(0, 1, fibres.shape[1]) / 0.45, 0, 1) ** 2
+            fibres = fibres + (fade if end == 0 else fade[::-1])[None, :, None] * shift[:, None]
+        return fibres
 
 
-def _mirrored_middle(fibres, row):
+def _fading(fibres, first, last):
+    """(f, p) 0 at the ends named, 1 from `MERGE` mm on."""
+    step = np.linalg.norm(np.diff(fibres, axis=1), axis=2)
+    along = np.concatenate([np.zeros((len(fibres), 1)), np.cumsum(step, axis=1)], axis=1)
+    out = np.ones(along.shape)
+    for wanted, away in ((first, along), (last, along[:, -1:] - along)):
+        if wanted:
+            out = np.minimum(out, np.clip(away / MERGE, 0, 1))
+    return out
+
+
+def _profile(row):
+    return [float(x) for x in row["profile"].split()]
+
+
+def _mirrored(values, row):
     """The mirror image of a midline muscle, its fibres or its points in the matching order."""
-    flipped = fibres * [-1, 1, 1]
+    flipped = values * (MIRROR if values.shape[-1] == 3 else 1.0)
     return flipped[:, ::-1] if row["kind"] == "sphincter" else flipped[::-1]
 
 
-def _smoothed_ring(rings, rounds):
-    for _ in range(rounds):
-        rings = 0.5 * rings + 0.25 * (np.roll(rings, 1, axis=1) + np.roll(rings, -1, axis=1))
-    return rings
+def _symmetric(fibres, row):
+    return (fibres + _mirrored(fibres, row)) / 2
+
+
+def _other_side(muscle):
+    """The right muscle of a pair."""
+    faces = muscle.shape.faces
+    faces = np.where(faces[:, 3:] >= 0, faces[:, [0, 3, 2, 1]], faces[:, [0, 2, 1, 3]])
+    return replace(
+        muscle,
+        name=muscle.name + "_r",
+        fibres=muscle.fibres * MIRROR,
+        shape=Mesh(muscle.shape.vertices * MIRROR, faces),
+        centre=None if muscle.centre is None else muscle.centre * MIRROR,
+    )

@@ -1,93 +1,82 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The soft tissue as muscles see it: how far in a place is between skin and bone."""
+"""The soft tissue as muscles are painted into it: the place on the skin, and how deep it is to bone there."""
 
 import numpy as np
 from scipy.spatial import cKDTree
 
+from ...sim.anatomy.muscle_room import Room, Samples, both_ways
 from ...sim.mesh import Mesh
-from .skull_depth import BoneSpace, sampled
+from .skull_depth import _without_ears
 
 #: Depth, mm, taken for the whole soft tissue where a ray inward meets no bone (cheek, neck).
-HOLLOW = 15.0
+HOLLOW = 14.0
 
 
 class Tissue:
-    """Skin outside, bone and the mouth's lining inside."""
+    """Skin outside, without its ears; bone and the mouth's lining inside."""
 
-    def __init__(self, space: BoneSpace, bones: list[Mesh], skin: Mesh, inner: np.ndarray):
-        self._skin = cKDTree(space.points)
-        self._skin_normal = space.directions
-        samples = [sampled(mesh.vertices, mesh.triangles, 1.5) for mesh in bones]
-        self._bone = cKDTree(np.concatenate([p for p, _ in samples]))
-        self._bone_normal = np.concatenate([n for _, n in samples])
-        lining = skin.triangles[inner[skin.triangles].all(axis=1)]
-        points, self._lining_normal = sampled(skin.vertices, lining, 1.5)
-        self._lining = cKDTree(points)
+    def __init__(self, room: Room, skin: Mesh, groups: dict[str, np.ndarray]):
+        inner = np.asarray(groups["inner"]) > 0.5
+        smooth = _without_ears(skin, np.asarray(groups["ear_l"], float) + np.asarray(groups["ear_r"], float))
+        triangles = both_ways(skin.faces)
+        self._skin = Samples(smooth, triangles[~inner[triangles].any(axis=1)])
+        self._room = room
 
     def foot(self, points):
-        """(n, 3) place on the skin nearest to each point, and the skin's (n, 3) smooth outward direction there."""
-        distance, near = self._skin.query(points, k=30)
-        weight = np.exp(-(((distance - distance[:, :1]) / 2.5) ** 2))[..., None]
-        normal = (weight * self._skin_normal[near]).sum(axis=1)
-        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-        place = (weight * self._skin.data[near]).sum(axis=1) / weight.sum(axis=1)
-        away = points - place
-        height = (away * normal).sum(1, keepdims=True)
-        return points - height * normal, normal
+        """(n, 3) place on the skin under which each point lies, and the skin's (n, 3) smooth outward direction."""
+        normal = self._skin.smooth_normal(points, 40)
+        height, _, _ = self._skin.height(points)
+        place = points - height[:, None] * normal
+        height, own, _ = self._skin.height(place)
+        return place - height[:, None] * own, normal
 
-    def laid(self, lines, share):
-        """Fibres (f, p, 3) laid along the skin at ``share`` (p,) of the way from skin (0) to bone (1)."""
-        feet = lines
-        for _ in range(4):
-            feet = evened(self.foot(feet.reshape(-1, 3))[0].reshape(lines.shape), 1)
-        feet, normal = self.foot(feet.reshape(-1, 3))
-        deep = self.thickness(feet, normal).reshape(lines.shape[:2])
-        deep = evened(deep, 2, ends=False)
-        normal = evened(normal.reshape(lines.shape), 2, ends=False)
+    def front(self, points):
+        """(n, 3) the place on the skin of the face straight before or behind each point."""
+        facing = (self._skin.normals[:, 1] < -0.1) & (self._skin.points[:, 1] < -20)
+        plane = [0, 2]
+        tree = cKDTree(self._skin.points[facing][:, plane])
+        near = tree.query(points[:, plane], k=4)[1]
+        out = points.copy()
+        out[:, 1] = self._skin.points[facing][near, 1].mean(axis=1)
+        return out
+
+    def lower_end(self) -> dict[str, np.ndarray]:
+        """``b:front`` and ``b:side``, (3,) mm: beside the middle and far out, just above the rim of bust or neck."""
+        front = self._skin.points[self._skin.normals[:, 1] < -0.2]
+        front = front[front[:, 2] < front[:, 2].min() + 60]
+        out = {}
+        for name, x, above in (("b:front", 15.0, 28.0), ("b:side", 0.76 * front[:, 0].max(), 20.0)):
+            strip = front[np.abs(front[:, 0] - x) < 5]
+            height = strip[:, 2].min() + above
+            out[name] = strip[np.linalg.norm(strip[:, [0, 2]] - [x, height], axis=1).argmin()]
+        return out
+
+    def painted(self, lines):
+        """Fibres (f, p, 3) moved onto the skin, the outward directions (f, p, 3) and the mm (f, p) of tissue there."""
+        shape = lines.shape
+        for _ in range(3):
+            lines = self.foot(lines.reshape(-1, 3))[0].reshape(shape)
+            lines = evened(lines, 1)
+        feet, normal = self.foot(lines.reshape(-1, 3))
+        normal = evened(normal.reshape(shape), 2, ends=False)
         normal /= np.linalg.norm(normal, axis=2, keepdims=True)
-        deep = np.clip(deep * share, 1.2, None)
-        return evened(feet.reshape(lines.shape) - deep[..., None] * normal, 1)
+        deep = self.thickness(feet, normal.reshape(-1, 3)).reshape(shape[:2])
+        return feet.reshape(shape), normal, evened(deep, 1, ends=False)
 
-    def thickness(self, foot, normal, lining=True):
+    def thickness(self, foot, normal):
         """(n,) mm from the skin inward to bone, or to the lining of mouth and nose."""
         steps = np.arange(1.0, 30.0, 0.75)
         ray = foot[:, None] - steps[None, :, None] * normal[:, None]
         flat = ray.reshape(-1, 3)
-        hit = (self.into_bone(flat) > -0.4).reshape(ray.shape[:2])
-        if lining:
-            hit |= (self._lining.query(flat)[0] < 1.2).reshape(ray.shape[:2]) & (steps > 3)
-        first = np.where(hit.any(axis=1), steps[hit.argmax(axis=1)], HOLLOW)
-        return np.minimum(first, 26.0)
-
-    def into_bone(self, points):
-        """(n,) mm inside bone, negative outside."""
-        distance, near = self._bone.query(points)
-        side = ((points - self._bone.data[near]) * self._bone_normal[near]).sum(1)
-        return np.where(side < 0, distance, -distance)
-
-    def out_of_bone(self, points, clear):
-        """(n, 3): points nearer than ``clear`` mm to bone, or inside it, moved out along the bone's normal."""
-        for _ in range(4):
-            distance, near = self._bone.query(points)
-            normal = self._bone_normal[near]
-            height = ((points - self._bone.data[near]) * normal).sum(1)
-            push = np.where(distance < 12, np.maximum(clear - height, 0), 0)
-            points = points + np.minimum(push, 4.0)[:, None] * normal
-        return points
-
-    def under_skin(self, points, clear):
-        """(n, 3): points nearer than ``clear`` mm to the skin moved inward."""
-        distance, near = self._skin.query(points)
-        normal = self._skin_normal[near]
-        height = ((self._skin.data[near] - points) * normal).sum(1)
-        return points - np.maximum(clear - height, 0)[:, None] * normal
-
-    def off_lining(self, points, clear):
-        """(n, 3): points nearer than ``clear`` mm to the lining of mouth or nose moved back into the flesh."""
-        distance, near = self._lining.query(points)
-        normal = self._lining_normal[near]
-        height = ((self._lining.data[near] - points) * normal).sum(1)
-        return points - np.where(distance < 8, np.maximum(clear - height, 0), 0)[:, None] * normal
+        height = np.min([b.signed(flat) for b in self._room.bones], axis=0).reshape(ray.shape[:2])
+        hit = height < 0.0
+        if self._room.lining is not None:
+            hit |= (self._room.lining.height(flat, 1.2)[2] < 1.2).reshape(ray.shape[:2]) & (steps > 2)
+        first = hit.argmax(axis=1)
+        row = np.arange(len(foot))
+        before = np.maximum(height[row, np.maximum(first - 1, 0)], 0)  # from the last step outside, as far as is left
+        found = np.where(first > 0, steps[np.maximum(first - 1, 0)] + np.minimum(before, 0.75), steps[0])
+        return np.where(hit.any(axis=1), found, HOLLOW)
 
 
 def evened(values, rounds, ends=True):

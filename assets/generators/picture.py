@@ -28,6 +28,7 @@ class Layer:
     lines : (l, 2, 3) mm segments drawn on the surface, hidden where something lies in front
     ink : (3,) or (l, 3) colour of the lines
     gloss : strength of the highlight
+    ink_share : how much of what is under a line it covers, 0..1
     """
 
     vertices: np.ndarray
@@ -36,6 +37,7 @@ class Layer:
     lines: np.ndarray | None = None
     ink: np.ndarray = field(default_factory=lambda: np.array([0.12, 0.08, 0.07]))
     gloss: float = 0.12
+    ink_share: float = 0.65
 
 
 def draw(layers: list[Layer], view: Viewpoint) -> np.ndarray:
@@ -71,7 +73,7 @@ def draw(layers: list[Layer], view: Viewpoint) -> np.ndarray:
         image[where] = np.clip(lit, 0, 1) ** (1 / 2.2)
     for each in layers:
         if each.lines is not None and len(each.lines):
-            _ink(image, fine, seen.depth, each.lines, each.ink)
+            _ink(image, fine, seen.depth, each)
     small = image.reshape(view.height, 2, view.width, 2, 3).mean(axis=(1, 3))
     return small
 
@@ -89,8 +91,9 @@ def _open_sky(depth: np.ndarray) -> np.ndarray:
     return out
 
 
-def _ink(image, view, depth, lines, ink):
-    """Draw segments into the picture, hidden by what is more than 0.6 mm nearer."""
+def _ink(image, view, depth, layer):
+    """Draw a layer's segments into the picture, hidden by what is more than 0.6 mm nearer."""
+    lines, ink = layer.lines, layer.ink
     ends = view.project(lines.reshape(-1, 3)).reshape(-1, 2, 3)
     count = np.ceil(np.abs(ends[:, 1, :2] - ends[:, 0, :2]).max(axis=1)).clip(1, 4000).astype(int) + 1
     of = np.repeat(np.arange(len(lines)), count)
@@ -102,7 +105,7 @@ def _ink(image, view, depth, lines, ink):
     on_top = near < depth[y, x] + 0.6
     x, y, of = x[on_top], y[on_top], of[on_top]
     colour = np.broadcast_to(ink, (len(lines), 3))[of]
-    image[y, x] = 0.35 * image[y, x] + 0.65 * colour
+    image[y, x] = (1 - layer.ink_share) * image[y, x] + layer.ink_share * colour
 
 
 def montage(rows: list[list[np.ndarray]], gap: int = 4) -> np.ndarray:

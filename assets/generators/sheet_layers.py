@@ -8,8 +8,10 @@ import numpy as np
 from ...sim.anatomy.head import MATERIALS, Head
 from ...sim.mesh import Mesh, edges
 from ...sim.mesh_subdivision import limit, subdivision
+from .muscles import rows
 from .picture import Layer
 
+TENDON = np.array([0.86, 0.78, 0.70])
 LIP, LINING = np.array([0.74, 0.40, 0.37]), np.array([0.55, 0.22, 0.21])
 SKIN, BONE, JAW = np.array([0.84, 0.64, 0.54]), np.array([0.88, 0.84, 0.74]), np.array([0.70, 0.78, 0.88])
 
@@ -84,13 +86,32 @@ def bone_layers(head: Head) -> list[Layer]:
     return [part_layer(head, "skull", BONE), part_layer(head, "mandible", JAW)]
 
 
-def muscle_layers(head: Head) -> list[Layer]:
-    """Every belly in a colour of its own."""
+def muscle_layers(head: Head, least: float = 0.0) -> list[Layer]:
+    """Every belly in a red of its layer, paler toward its tendons, with its fibres as lines.
+
+    ``least`` leaves out the muscles above that level of the table (0 draws all; 2 only those deeper than 2).
+    """
+    level = {row["name"]: float(row["level"]) for row in rows()}
     layers = []
     for muscle in head.muscles:
-        hue = (sum(map(ord, muscle.name.removesuffix("_l").removesuffix("_r"))) * 0.618) % 1
-        colour = np.array(colorsys.hsv_to_rgb(hue, 0.55, 0.8)) * 0.6 + np.array([0.7, 0.25, 0.2]) * 0.4
-        layers.append(Layer(muscle.shape.vertices, muscle.shape.triangles, colour))
+        base = muscle.name.removesuffix("_l").removesuffix("_r")
+        if least and level[base] >= least:
+            continue
+        hue = 0.012 + 0.004 * (sum(map(ord, base)) % 5)
+        value = 0.60 + 0.035 * level[base] + 0.02 * (sum(map(ord, base)) % 3)
+        belly = np.array(colorsys.hsv_to_rgb(hue, 0.66 - 0.02 * level[base], value))
+        around = 4 * len(muscle.fibres) - 4
+        vertices = muscle.shape.vertices
+        rings = vertices.reshape(-1, around, 3)
+        along = np.linspace(0, 1, len(rings))
+        pale = np.zeros_like(along) if muscle.ring else 0.75 * np.clip(1 - along / 0.14, 0, 1)
+        if not muscle.ring and muscle.insertion != "soft":
+            pale = np.maximum(pale, 0.75 * np.clip(1 - (1 - along) / 0.14, 0, 1))
+        colour = np.repeat(belly + pale[:, None] * (TENDON - belly), around, axis=0)
+        strands = np.stack([rings, 0.5 * (rings + np.roll(rings, -1, axis=1))], axis=2).reshape(len(rings), -1, 3)
+        nearer = np.roll(strands, -1, axis=0) if muscle.ring else strands[1:]
+        lines = np.stack([strands[: len(nearer)], nearer], axis=2).reshape(-1, 2, 3)
+        layers.append(Layer(vertices, muscle.shape.triangles, colour, lines, belly * 0.72, gloss=0.18, ink_share=0.3))
     return layers
 
 

@@ -131,7 +131,19 @@ class Sheets:
     def muscles(self):
         """Muscles over the bones."""
         layers = [*muscle_layers(self.head), *bone_layers(self.head), *self.eyes, *self.teeth]
-        return self._six(layers, [0, -10, -10], 280)
+        low = min(muscle.shape.vertices[:, 2].min() for muscle in self.head.muscles)
+        return self._six(layers, [0, -10, (low + self.marks["v"][2]) / 2], self.marks["v"][2] - low + 20)
+
+    def facemuscles(self):
+        """The muscles of the face, larger: all of them above, the deep ones below."""
+        rest = [*bone_layers(self.head), *self.eyes, *self.teeth]
+        views = ((0, 0), (40, 5), (85, 0), (15, -35))
+        return montage(
+            [
+                self._row([*muscle_layers(self.head, least), *rest], [0, -45, -8], 175, views, 1.5)
+                for least in (0.0, 2.5)
+            ]
+        )
 
     def rows(self):
         """Both rows of teeth."""
@@ -188,6 +200,7 @@ class Sheets:
 SHEETS = (
     *("skin", "wire", "face", "facewire", "eye", "ear", "nose", "lips", "skull", "muscles", "rows", "tongue"),
     *("eyeballs", "blink", "poses", "mouth", "landmarks", "texture"),
+    "facemuscles",
 )
 
 

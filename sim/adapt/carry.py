@@ -7,7 +7,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..anatomy.head import Head, Muscle
-from ..anatomy.muscle_shape import Room, reshaped
+from ..anatomy.muscle_room import Room
+from ..anatomy.muscle_shape import reshaped
 from ..anatomy.tissue_depth import tissue_vectors
 from ..progress import Progress, Work
 from . import bone, eyeballs
@@ -99,7 +100,8 @@ def carry(reference: Head, fit: SkinFit) -> Work:
 
     yield Progress(0.8, "Muscles")
     warp = between.warp(parts, final)
-    room = Room(skin.moved(final), [reference.parts[n].moved(parts[n]) for n in BONES], inner)
+    bones = [reference.parts[n].moved(parts[n]) for n in BONES]
+    room = Room(skin.moved(final), bones, inner, [(eye.centre, eye.radius) for eye in eyes])
     muscles = tuple(carried_muscle(m, warp, room) for m in reference.muscles)
     head = replace(reference.with_vertices(parts), muscles=muscles, jaw=jaw, eyes=tuple(eyes))
     return Carried(head, moved)
@@ -222,15 +224,8 @@ def angle_from(vectors, direction):
 
 def carried_muscle(muscle: Muscle, warp, room: Room) -> Muscle:
     """A muscle whose fibres went through ``warp`` and whose belly is made anew in the room there is (5.2, item 3)."""
-    fibres = warp.transform(muscle.fibres)
-    grow = float(np.clip(_length(fibres) / max(_length(muscle.fibres), 1e-9), 0.5, 1.6)) ** 0.5
     centre = None if muscle.centre is None else warp.transform(muscle.centre[None])[0]
-    muscle = replace(muscle, width=muscle.width * grow, thickness=muscle.thickness * grow)
-    return reshaped(muscle, fibres, room, centre)
-
-
-def _length(fibres) -> float:
-    return float(np.linalg.norm(np.diff(fibres, axis=1), axis=2).sum(axis=1).mean())
+    return reshaped(muscle, warp.transform(muscle.fibres), room, centre)
 
 
 def carried_jaw(reference: Head, parts, mouth, scale: float):

@@ -1,167 +1,166 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The belly of a muscle as a closed surface round its fibres, made again after every warp (Kähler 2002, 5.2, item 3).
 
-A muscle's surface is a flat tube: its middle sheet is spanned by the fibres, its thickness swells from a tendon at
-either end to the belly, and it never reaches beyond the room between skin and bone.
+The fibres span a muscle's middle sheet, from edge to edge. Its surface lies half a thickness to either side: rounded
+across, swelling from a tendon at either end to the belly, faintly furrowed between the fibres, and never beyond the
+room between skin and bone. All heads share a muscle's connectivity, which the number of its fibres and of their points
+decides.
 """
 
 from dataclasses import replace
 
 import numpy as np
-from scipy.spatial import cKDTree
 
-from ..mesh import Mesh, vertex_normals
+from ..mesh import Mesh
 from .head import Muscle
+from .muscle_room import Room
 
-#: Stations along a muscle and around a ring, columns across its sheet: heads share connectivity.
-ALONG, AROUND, ACROSS = 14, 28, 6
-#: Share of the belly's thickness left at a tendon.
-TENDON = 0.22
-
-
-class Room:
-    """The soft tissue between skin and bone.
-
-    skin, bones : meshes, mm; bones may be empty. inner : (n,) bool, the skin's vertices that line mouth, nose and
-    lids (the group ``inner``). Distances are to points sampled on the surfaces.
-    """
-
-    def __init__(self, skin: Mesh, bones: list[Mesh], inner: np.ndarray | None = None):
-        inner = np.zeros(len(skin.vertices), bool) if inner is None else np.asarray(inner, bool)
-        lining = inner[skin.triangles].all(axis=1)
-        self._skin = _Samples([(skin.vertices, skin.triangles[~lining])])
-        inside = [(mesh.vertices, mesh.triangles) for mesh in bones]
-        if lining.any():
-            inside.append((skin.vertices, skin.triangles[lining]))
-        self._inside = _Samples(inside) if inside else None
-
-    def outward(self, points):
-        """(n, 3) unit direction to the skin's outside, (n,) mm of room to the skin and to bone or lining."""
-        normal, to_skin = self._skin.normal_and_distance(points)
-        inside = np.full(len(points), np.inf) if self._inside is None else self._inside.normal_and_distance(points)[1]
-        return normal, to_skin, inside
+#: Share of the belly's thickness at even stations from origin to insertion, where nothing else is asked for.
+SPINDLE = (0.22, 0.72, 1.0, 1.0, 0.72, 0.22)
+#: Share of the thickness that the furrow between two fibres takes away.
+FURROW = 0.10
 
 
-class _Samples:
-    def __init__(self, meshes):
-        points, normals = [], []
-        for vertices, corner in meshes:
-            normal = vertex_normals(vertices, corner)
-            used = np.unique(corner)
-            points += [vertices[used], vertices[corner].mean(axis=1)]
-            normals += [normal[used], normal[corner].mean(axis=1)]
-        self._tree = cKDTree(np.concatenate(points))
-        self._normals = np.concatenate(normals)
-
-    def normal_and_distance(self, points):
-        distance, near = self._tree.query(points, k=8)
-        weight = 1 / (distance + 1.0) ** 2
-        normal = (weight[..., None] * self._normals[near]).sum(axis=1)
-        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-9)
-        # Samples lie some mm apart: the plane through the nearest tells the distance better than the sample itself.
-        height = np.abs(((points - self._tree.data[near[:, 0]]) * self._normals[near[:, 0]]).sum(axis=1))
-        return normal, np.maximum(height, 0.3 * distance[:, 0])
-
-
-def muscle_shape(fibres: np.ndarray, width: float, thickness: float, ring=False, room: Room | None = None) -> Mesh:
+def muscle_shape(
+    fibres: np.ndarray, width: float, thickness: float, ring=False, room: Room | None = None, profile=SPINDLE
+) -> Mesh:
     """The closed surface of a muscle.
 
     Parameters
     ----------
-    fibres : (f, p, 3) mm, f >= 2 side by side; a closed ring repeats no point
-    width : mm, least width of the belly (the fibres may span more)
+    fibres : (f, p, 3) mm, f >= 2 side by side, the outermost on the muscle's edges; a closed ring repeats no point
+    width : mm of the belly: how round the edges are beside ``thickness``
     thickness : mm of the belly
     ring : a sphincter that closes on itself
-    room : skin and bone that bound it; without it the sheet's own normal is used and nothing bounds it
+    room : skin and bone that bound it; without it nothing bounds it
+    profile : shares of the thickness along the fibres, at even stations (a ring has the same everywhere)
     """
-    fibres = np.asarray(fibres, dtype=float)
-    sheet = _resampled(fibres, ring)
-    along = np.roll(sheet, -1, 1) - np.roll(sheet, 1, 1) if ring else np.gradient(sheet, axis=1)
-    flat = sheet.reshape(-1, 3)
-    own = np.cross(along, np.gradient(sheet, axis=0)).reshape(-1, 3)
-    own /= np.maximum(np.linalg.norm(own, axis=1, keepdims=True), 1.0)
-    if room is None:
-        normal = own
-        to_skin = to_bone = np.full(len(flat), np.inf)
-    else:
-        normal, to_skin, to_bone = room.outward(flat)
-        normal = 0.4 * normal + own * np.sign((own * normal).sum(1, keepdims=True))
-    normal = normal - _share(normal, along.reshape(-1, 3))
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-9)
-    normal = _steadied(normal.reshape(sheet.shape), ring)
-    sheet = _spread(sheet, along, normal, width, ring)
-
-    belly = np.ones(AROUND) if ring else _belly(np.linspace(0, 1, ALONG))
-    across = np.linspace(-1, 1, ACROSS)
-    round_off = np.sqrt(np.maximum(1 - across**2, 0))
-    half = 0.5 * thickness * belly[None] * round_off[:, None]
-    over = np.minimum(half, np.maximum(0.75 * to_skin.reshape(half.shape), 0.15))
-    under = np.minimum(half, np.maximum(0.9 * to_bone.reshape(half.shape), 0.15))
-    top, bottom = sheet + over[..., None] * normal, sheet - under[..., None] * normal
-    # Once around a cross-section: over the top, back along the underside; the two edges are shared.
-    rings = np.concatenate([top, bottom[1:-1][::-1]]).transpose(1, 0, 2)
-    return _closed_tube(rings, ring)
+    sheet = muscle_sheet(fibres, ring)
+    normal = frames(sheet, ring, room)[2]
+    half = half_thickness(sheet, width, thickness, ring, profile)[..., None]
+    mesh = _closed_tube(sheet + half * normal, sheet - half * normal, ring)
+    return mesh if room is None else mesh.moved(room.fitted(mesh.vertices))
 
 
 def reshaped(muscle: Muscle, fibres: np.ndarray, room: Room | None = None, centre: np.ndarray | None = None) -> Muscle:
-    """``muscle`` with other fibres (f, p, 3) mm and the surface that belongs to them."""
-    shape = muscle_shape(fibres, muscle.width, muscle.thickness, muscle.ring, room)
-    return replace(muscle, fibres=fibres, shape=shape, centre=muscle.centre if centre is None else centre)
+    """``muscle`` with other fibres (f, p, 3) mm and the surface that belongs to them.
+
+    What the old surface has round each place of the old sheet, the new one has round the same place of the new sheet:
+    as thick as the root of the change in length says, turned with the sheet, kept in the new ``room``.
+    """
+    fibres = np.asarray(fibres, dtype=float)
+    grow = float(np.clip(_length(fibres) / max(_length(muscle.fibres), 1e-9), 0.5, 1.6)) ** 0.5
+    old, new = muscle_sheet(muscle.fibres, muscle.ring), muscle_sheet(fibres, muscle.ring)
+    at = _places(*old.shape[:2])
+    before, after = (np.stack(frames(x, muscle.ring), axis=-2).reshape(-1, 3, 3)[at] for x in (old, new))
+    offset = muscle.shape.vertices - old.reshape(-1, 3)[at]
+    local = np.einsum("nij,nj->ni", before, offset)
+    vertices = new.reshape(-1, 3)[at] + grow * np.einsum("nij,ni->nj", after, local)
+    if room is not None:
+        vertices = room.fitted(vertices)
+    return replace(
+        muscle,
+        fibres=fibres,
+        width=muscle.width * grow,
+        thickness=muscle.thickness * grow,
+        shape=muscle.shape.moved(vertices),
+        centre=muscle.centre if centre is None else centre,
+    )
 
 
-def _resampled(fibres, ring):
-    """(ACROSS, ALONG or AROUND, 3): the fibres at even stations, and even columns between the outermost."""
-    count = len(fibres)
+def recentred(muscle: Muscle, centre: np.ndarray) -> Muscle:
+    """A sphincter that pulls towards another ``centre`` (3,) mm; its fibres and its surface stay.
+
+    Raises
+    ------
+    ValueError : the muscle is no sphincter.
+    """
+    if muscle.kind != "sphincter":
+        raise ValueError(f"{muscle.name} is {muscle.kind}: only a sphincter has a centre to move")
+    return replace(muscle, centre=np.array(centre, dtype=float).reshape(3))
+
+
+def muscle_sheet(fibres: np.ndarray, ring=False) -> np.ndarray:
+    """(c, s, 3) mm: the fibres with a column between each two and a station between each two points.
+
+    Points between are those of the interpolating four-point scheme (Dyn, Levin and Gregory 1987).
+    """
+    return _refined(_refined(np.asarray(fibres, dtype=float), 0, False), 1, ring)
+
+
+def half_thickness(sheet: np.ndarray, width: float, thickness: float, ring=False, profile=SPINDLE) -> np.ndarray:
+    """(c, s) mm from the middle sheet to the surface, before anything bounds it."""
+    columns, stations = sheet.shape[:2]
+    across = np.abs(np.linspace(-1, 1, columns))
+    flat = np.clip(1.5 + width / max(thickness, 0.1) / 4, 2, 4)  # a thin sheet keeps its thickness to near its edge
+    rounding = np.sqrt(np.maximum(1 - across**flat, 0))
+    rounding[1::2] *= 1 - FURROW
     if ring:
-        fibres = np.concatenate([fibres, fibres[:, :1]], axis=1)
-    at = np.linspace(0, fibres.shape[1] - 1, AROUND + 1)[:-1] if ring else np.linspace(0, fibres.shape[1] - 1, ALONG)
-    i = np.minimum(at.astype(int), fibres.shape[1] - 2)
-    t = (at - i)[None, :, None]
-    even = fibres[:, i] * (1 - t) + fibres[:, i + 1] * t
-    at = np.linspace(0, count - 1, ACROSS)
-    i = np.minimum(at.astype(int), max(count - 2, 0))
-    t = (at - i)[:, None, None]
-    return even[i] * (1 - t) + even[np.minimum(i + 1, count - 1)] * t
+        along = np.ones(stations)
+    else:
+        along = np.interp(np.linspace(0, 1, stations), np.linspace(0, 1, len(profile)), profile)
+        along[1:-1] = 0.25 * along[:-2] + 0.5 * along[1:-1] + 0.25 * along[2:]
+    return 0.5 * thickness * rounding[:, None] * along[None]
 
 
-def _share(vectors, along):
-    length = np.maximum((along**2).sum(1, keepdims=True), 1e-12)
-    return (vectors * along).sum(1, keepdims=True) / length * along
+def frames(sheet: np.ndarray, ring=False, room: Room | None = None):
+    """Unit vectors (c, s, 3) along the fibres, to the side and out of the sheet (toward the skin of ``room``)."""
+    along = np.roll(sheet, -1, 1) - np.roll(sheet, 1, 1) if ring else np.gradient(sheet, axis=1)
+    side = np.gradient(sheet, axis=0)
+    # Where fibres meet in one point the sheet has no breadth: the middle of the station says how it lies.
+    normal = np.cross(along, side) + 0.2 * np.cross(along, side.mean(axis=0)[None])
+    normal /= np.maximum(np.linalg.norm(normal, axis=2, keepdims=True), 1e-9)
+    for _ in range(4):
+        normal = _unit(_evened(normal, ring))
+    if room is not None:
+        outward = room.outward(sheet.reshape(-1, 3)).reshape(sheet.shape)
+        normal = normal * (np.sign((outward * normal).sum()) or 1.0)
+    along = _unit(along - (along * normal).sum(-1, keepdims=True) * normal)
+    return along, np.cross(normal, along), normal
 
 
-def _steadied(normal, ring):
-    """Normals smoothed along the muscle, so that its surface does not ripple."""
-    for _ in range(3):
-        before, after = np.roll(normal, 1, 1), np.roll(normal, -1, 1)
-        if not ring:
-            before[:, 0], after[:, -1] = normal[:, 0], normal[:, -1]
-        normal = normal + 0.5 * (before + after)
-        normal /= np.maximum(np.linalg.norm(normal, axis=2, keepdims=True), 1e-9)
-    return normal
+def _refined(values, axis, closed):
+    v = np.moveaxis(values, axis, 0)
+    n = len(v)
+    if closed:
+        middle = (9 * (v + np.roll(v, -1, 0)) - np.roll(v, 1, 0) - np.roll(v, -2, 0)) / 16
+        out = np.stack([v, middle], axis=1).reshape(2 * n, *v.shape[1:])
+    else:
+        ends = np.concatenate([2 * v[:1] - v[1:2], v, 2 * v[-1:] - v[-2:-1]])
+        out = np.empty((2 * n - 1, *v.shape[1:]))
+        out[::2] = v
+        out[1::2] = (9 * (v[:-1] + v[1:]) - ends[: n - 1] - ends[3:]) / 16
+    return np.moveaxis(out, 0, axis)
 
 
-def _spread(sheet, along, normal, width, ring):
-    """The sheet widened about its middle line where the fibres run closer than the muscle is wide there."""
-    if ring:  # the fibres of a ring tell its width themselves
-        return sheet
-    side = np.cross(normal.mean(axis=0), along.mean(axis=0))
-    side /= np.maximum(np.linalg.norm(side, axis=1, keepdims=True), 1e-9)
-    span = ((sheet[-1] - sheet[0]) * side).sum(axis=1)
-    if span.sum() < 0:
-        side, span = -side, -span
-    want = width * (0.30 + 0.70 * _belly(np.linspace(0, 1, ALONG)))
-    lack = np.maximum(want - np.maximum(span, 0), 0)
-    return sheet + np.linspace(-0.5, 0.5, ACROSS)[:, None, None] * (lack[:, None] * side)[None]
+def _unit(vectors):
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-9)
 
 
-def _belly(t):
-    """Thickness along a muscle as a share of the belly's: tendon, belly, tendon."""
-    swell = np.sin(np.pi * np.clip(t, 0, 1)) ** 0.7
-    return TENDON + (1 - TENDON) * swell
+def _evened(values, ring):
+    """Values smoothed along the muscle and across it, so that its surface does not ripple."""
+    if ring:
+        values = 0.5 * values + 0.25 * (np.roll(values, 1, 1) + np.roll(values, -1, 1))
+    else:
+        ends = np.concatenate([values[:, :1], values, values[:, -1:]], axis=1)
+        values = 0.5 * values + 0.25 * (ends[:, :-2] + ends[:, 2:])
+    ends = np.concatenate([values[:1], values, values[-1:]])
+    return 0.5 * values + 0.25 * (ends[:-2] + ends[2:])
 
 
-def _closed_tube(rings, ring):
-    """Mesh of (k, m, 3) cross-sections joined by quads, closed on itself or by caps, facing outward."""
+def _length(fibres) -> float:
+    return float(np.linalg.norm(np.diff(fibres, axis=1), axis=2).sum(axis=1).mean())
+
+
+def _places(columns, stations):
+    """(n,) the place in the flattened sheet that each vertex of the tube belongs to."""
+    across = np.concatenate([np.arange(columns), np.arange(columns - 2, 0, -1)])
+    return (across[None] * stations + np.arange(stations)[:, None]).ravel()
+
+
+def _closed_tube(top, bottom, ring):
+    """Mesh whose cross-sections run over the ``top`` (c, s, 3) and back along the ``bottom``; the edges are shared."""
+    rings = np.concatenate([top, bottom[1:-1][::-1]]).transpose(1, 0, 2)
     k, m = rings.shape[:2]
     vertices = rings.reshape(-1, 3)
     j = np.arange(m)
@@ -171,9 +170,9 @@ def _closed_tube(rings, ring):
     if not ring:
         # Caps: quads across the flat end, from edge to edge.
         half = m // 2
-        top = np.arange(half + 1)
-        low = (m - top) % m
-        cap = np.stack([top[:-1], top[1:], low[1:], low[:-1]], axis=1)
+        over = np.arange(half + 1)
+        under = (m - over) % m
+        cap = np.stack([over[:-1], over[1:], under[1:], under[:-1]], axis=1)
         cap = _without_doubles(cap)
         faces = np.concatenate([faces, cap, _flipped(cap + (cap >= 0) * (k - 1) * m)])
     faces = faces.astype(np.int32)

@@ -1,0 +1,126 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The soft tissue muscles live in: under the skin, outside bone, mouth and eyeballs (Kähler 2002, 5.2, item 3)."""
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..mesh import Mesh, vertex_normals
+
+#: mm between the points a surface is sampled by.
+SPACING = 1.6
+#: mm of skin kept over a muscle; how near it may come to the lining of mouth and lids, and to bone.
+SKIN_CLEAR, LINING_CLEAR, BONE_CLEAR, EYE_CLEAR = 0.6, 0.25, 0.05, 0.2
+
+
+class Room:
+    """The soft tissue between skin and bone.
+
+    skin, bones : meshes, mm; bones may be empty. inner : (n,) bool, the skin's vertices that line mouth, nose and
+    lids (the group ``inner``). eyes : (centre (3,), radius) of each eyeball. Distances are to points sampled densely
+    on the surfaces, and to the planes through them.
+    """
+
+    def __init__(self, skin: Mesh, bones: list[Mesh], inner: np.ndarray | None = None, eyes=()):
+        inner = np.zeros(len(skin.vertices), bool) if inner is None else np.asarray(inner, bool)
+        triangles = both_ways(skin.faces)
+        lining = inner[triangles].all(axis=1)
+        normals = vertex_normals(skin.vertices, triangles)
+        self.skin = Samples(skin.vertices, triangles[~lining], normals)
+        self.lining = Samples(skin.vertices, triangles[lining], normals, SPACING / 2) if lining.any() else None
+        self.bones = [Samples(mesh.vertices, both_ways(mesh.faces)) for mesh in bones]
+        self.eyes = tuple(eyes)
+
+    def outward(self, points) -> np.ndarray:
+        """(n, 3) unit direction to the skin's outside, smoothed over some mm."""
+        return self.skin.smooth_normal(points)
+
+    def fitted(self, points, rounds: int = 6) -> np.ndarray:
+        """``points`` (n, 3) mm brought into the soft tissue by the shortest way; the skin has the last word."""
+        points = np.array(points, dtype=float)
+        todo = np.arange(len(points))
+        for _ in range(rounds):
+            moved = self._fitted_once(points[todo])
+            far = np.abs(moved - points[todo]).max(axis=1) > 1e-3
+            points[todo] = moved
+            todo = todo[far]
+            if not len(todo):
+                break
+        return points
+
+    def _fitted_once(self, points):
+        for solid in self.bones:
+            height, normal, _ = solid.height(points, 10.0)
+            push = np.minimum(np.maximum(BONE_CLEAR - height, 0), 3.0)
+            points = points + push[:, None] * normal
+        for centre, radius in self.eyes:
+            away = points - centre
+            far = np.linalg.norm(away, axis=1, keepdims=True)
+            points = np.where(far < radius + EYE_CLEAR, centre + away / far * (radius + EYE_CLEAR), points)
+        if self.lining is not None:
+            points = _under(points, self.lining, LINING_CLEAR, 6.0)
+        return _under(points, self.skin, SKIN_CLEAR, 20.0)
+
+
+def both_ways(faces) -> np.ndarray:
+    """(t, 3): quads split along either diagonal, triangles twice, so that a surface and its mirror image agree."""
+    quads = np.where(faces[:, 3:] >= 0, faces, faces[:, [0, 1, 2, 0]])
+    parts = [quads[:, [0, 1, 2]], quads[:, [0, 2, 3]], quads[:, [1, 2, 3]], quads[:, [1, 3, 0]]]
+    triangles = np.concatenate(parts)
+    return triangles[(triangles != np.roll(triangles, 1, axis=1)).all(axis=1)]
+
+
+def _under(points, surface, clear, reach):
+    height, normal, far = surface.height(points, reach)
+    deep = np.where(np.isfinite(far), np.clip(height + clear, 0, 3.0), 0)
+    return points - deep[:, None] * normal
+
+
+class Samples:
+    """A surface (n, 3), (m, 3) as points about ``spacing`` mm apart with smooth normals.
+
+    ``normals`` (n, 3): those of a larger surface of which this is a piece.
+    """
+
+    def __init__(self, vertices, triangles, normals=None, spacing=SPACING):
+        normals = vertex_normals(vertices, triangles) if normals is None else normals
+        corner, bent = vertices[triangles], normals[triangles]
+        longest = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2).max(axis=1)
+        parts = np.clip(np.ceil(longest / spacing), 1, 20).astype(int)
+        points, directions = [], []
+        for n in np.unique(parts):
+            i, j = (a.ravel() for a in np.meshgrid(np.arange(n + 1), np.arange(n + 1), indexing="ij"))
+            keep = i + j <= n
+            w = np.stack([i[keep], j[keep], n - i[keep] - j[keep]], axis=1) / n
+            some = parts == n
+            points.append(np.einsum("wk,tkd->twd", w, corner[some]).reshape(-1, 3))
+            directions.append(np.einsum("wk,tkd->twd", w, bent[some]).reshape(-1, 3))
+        self.points, self.normals = np.concatenate(points), np.concatenate(directions)
+        self.normals /= np.maximum(np.linalg.norm(self.normals, axis=1, keepdims=True), 1e-12)
+        self._tree = cKDTree(self.points)
+
+    def height(self, points, reach=np.inf):
+        """(n,) mm above the surface (negative inside), the (n, 3) normal there and the (n,) mm to the nearest sample.
+
+        Where nothing is within ``reach`` mm both lengths are infinite.
+        """
+        far, near = self._tree.query(points, distance_upper_bound=reach)
+        found = np.isfinite(far)
+        near = np.where(found, near, 0)
+        normal = self.normals[near]
+        return np.where(found, ((points - self.points[near]) * normal).sum(1), np.inf), normal, far
+
+    def signed(self, points):
+        """(n,) mm to the surface, negative inside a closed one."""
+        height, _, far = self.height(points)
+        return np.where(height < 0, -far, far)
+
+    def nearest(self, points):
+        """(n, 3) mm: the sample nearest to each point."""
+        return self.points[self._tree.query(points)[1]]
+
+    def smooth_normal(self, points, count: int = 24):
+        """(n, 3) unit: the mean direction of the nearest samples."""
+        far, near = self._tree.query(points, k=min(count, len(self.points)))
+        weight = np.exp(-(((far - far[:, :1]) / 2.5) ** 2))[..., None]
+        normal = (weight * self.normals[near]).sum(axis=1)
+        return normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-9)
