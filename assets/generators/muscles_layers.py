@@ -20,19 +20,18 @@ class Layers:
 
     def __init__(self, room: Room):
         self.room = room
-        self._laid: list[tuple[float, np.ndarray]] = []
+        self._laid: list[tuple] = []
 
     def add(self, level: float, shape: Mesh, paired: bool) -> None:
         """Let ``shape`` count as laid at ``level`` (0 is deepest), its mirror image too."""
         points = Samples(shape.vertices, shape.triangles).points
-        self._laid.append((level, points))
-        if paired:
-            self._laid.append((level, points * [-1, 1, 1]))
+        for side in (points, points * [-1, 1, 1])[: 1 + paired]:
+            self._laid.append((level, side, side.min(axis=0), side.max(axis=0)))
 
     def lift(self, points, normals, level) -> np.ndarray:
         """(n,) mm each point (n, 3) must rise along its normal to clear what is deeper; at most 0 where it is clear."""
         low, high = points.min(axis=0) - 9, points.max(axis=0) + 9
-        deeper = [samples for at, samples in self._laid if at < level]
+        deeper = [s for at, s, a, b in self._laid if at < level and (a < high).all() and (b > low).all()]
         deeper = [s[((s > low) & (s < high)).all(axis=1)] for s in deeper]
         out = np.full(len(points), -np.inf)
         if not sum(map(len, deeper)):
@@ -61,7 +60,7 @@ class Layers:
         for k in range(rounds):
             if k < rounds - 2:
                 fibres = _smooth(fibres, ring)
-            if k % 3 == 1:
+            if k in (1, 4, 8):
                 fibres = fibres + keep[..., None] * self._rise(fibres, half, level, ring)
             flat = fibres.reshape(-1, 3)
             for bone in self.room.bones:

@@ -25,10 +25,8 @@ class Tissue:
     def foot(self, points):
         """(n, 3) place on the skin under which each point lies, and the skin's (n, 3) smooth outward direction."""
         normal = self._skin.smooth_normal(points, 40)
-        height, _, _ = self._skin.height(points)
-        place = points - height[:, None] * normal
-        height, own, _ = self._skin.height(place)
-        return place - height[:, None] * own, normal
+        height, out, _ = self._skin.height(points)
+        return points - height[:, None] * out, normal
 
     def front(self, points):
         """(n, 3) the place on the skin of the face straight before or behind each point."""
@@ -68,7 +66,7 @@ class Tissue:
         steps = np.arange(1.0, 30.0, 0.75)
         ray = foot[:, None] - steps[None, :, None] * normal[:, None]
         flat = ray.reshape(-1, 3)
-        height = np.min([b.signed(flat) for b in self._room.bones], axis=0).reshape(ray.shape[:2])
+        height = np.min([b.about(flat) for b in self._room.bones], axis=0).reshape(ray.shape[:2])
         hit = height < 0.0
         if self._room.lining is not None:
             hit |= (self._room.lining.height(flat, 1.2)[2] < 1.2).reshape(ray.shape[:2]) & (steps > 2)

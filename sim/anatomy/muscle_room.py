@@ -4,20 +4,21 @@
 import numpy as np
 from scipy.spatial import cKDTree
 
+from ..adapt.triangle_projection import closest_on_triangles
 from ..mesh import Mesh, vertex_normals
 
 #: mm between the points a surface is sampled by.
 SPACING = 1.6
 #: mm of skin kept over a muscle; how near it may come to the lining of mouth and lids, and to bone.
-SKIN_CLEAR, LINING_CLEAR, BONE_CLEAR, EYE_CLEAR = 0.6, 0.25, 0.05, 0.2
+SKIN_CLEAR, LINING_CLEAR, BONE_CLEAR, EYE_CLEAR = 0.45, 0.2, 0.12, 0.2
 
 
 class Room:
     """The soft tissue between skin and bone.
 
     skin, bones : meshes, mm; bones may be empty. inner : (n,) bool, the skin's vertices that line mouth, nose and
-    lids (the group ``inner``). eyes : (centre (3,), radius) of each eyeball. Distances are to points sampled densely
-    on the surfaces, and to the planes through them.
+    lids (the group ``inner``). eyes : (centre (3,), radius) of each eyeball. Surfaces are found by points sampled
+    on them.
     """
 
     def __init__(self, skin: Mesh, bones: list[Mesh], inner: np.ndarray | None = None, eyes=()):
@@ -75,6 +76,10 @@ def _under(points, surface, clear, reach):
     return points - deep[:, None] * normal
 
 
+def _unit(vectors):
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-12)
+
+
 class Samples:
     """A surface (n, 3), (m, 3) as points about ``spacing`` mm apart with smooth normals.
 
@@ -86,33 +91,45 @@ class Samples:
         corner, bent = vertices[triangles], normals[triangles]
         longest = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2).max(axis=1)
         parts = np.clip(np.ceil(longest / spacing), 1, 20).astype(int)
-        points, directions = [], []
+        points, owner = [], []
         for n in np.unique(parts):
             i, j = (a.ravel() for a in np.meshgrid(np.arange(n + 1), np.arange(n + 1), indexing="ij"))
             keep = i + j <= n
             w = np.stack([i[keep], j[keep], n - i[keep] - j[keep]], axis=1) / n
-            some = parts == n
+            some = np.flatnonzero(parts == n)
             points.append(np.einsum("wk,tkd->twd", w, corner[some]).reshape(-1, 3))
-            directions.append(np.einsum("wk,tkd->twd", w, bent[some]).reshape(-1, 3))
-        self.points, self.normals = np.concatenate(points), np.concatenate(directions)
-        self.normals /= np.maximum(np.linalg.norm(self.normals, axis=1, keepdims=True), 1e-12)
+            owner.append(np.repeat(some, len(w)))
+        self.points, self._owner = np.concatenate(points), np.concatenate(owner)
+        self._corner, self._bent = corner, bent
+        self.normals = _unit(bent.mean(axis=1))[self._owner]
         self._tree = cKDTree(self.points)
 
     def height(self, points, reach=np.inf):
-        """(n,) mm above the surface (negative inside), the (n, 3) normal there and the (n,) mm to the nearest sample.
+        """(n,) mm above the surface (negative inside), the (n, 3) way out of it and the (n,) mm to the nearest sample.
 
-        Where nothing is within ``reach`` mm both lengths are infinite.
+        Where nothing is within ``reach`` mm both lengths are infinite. Exact for the triangle of the nearest sample.
         """
-        far, near = self._tree.query(points, distance_upper_bound=reach)
-        found = np.isfinite(far)
-        near = np.where(found, near, 0)
-        normal = self.normals[near]
-        return np.where(found, ((points - self.points[near]) * normal).sum(1), np.inf), normal, far
+        count = min(3, len(self.points))  # in a fold the nearest sample may not be the nearest triangle's
+        far, near = self._tree.query(points, k=count, distance_upper_bound=reach)
+        far, near = far.reshape(len(points), -1), near.reshape(len(points), -1)
+        found = np.isfinite(far[:, 0])
+        triangle = self._owner[np.where(np.isfinite(far), near, np.where(found[:, None], near[:, :1], 0))]
+        corner = self._corner[triangle.ravel()]
+        weights, distance = closest_on_triangles(np.repeat(points, count, axis=0), *corner.transpose(1, 0, 2))
+        best = distance.reshape(-1, count).argmin(axis=1) + count * np.arange(len(points))
+        weights, distance, triangle = weights[best], distance[best], triangle.ravel()[best]
+        smooth = _unit(np.einsum("nk,nkd->nd", weights, self._bent[triangle]))
+        away = points - np.einsum("nk,nkd->nd", weights, self._corner[triangle])
+        side = np.where((away * smooth).sum(1) < 0, -1.0, 1.0)
+        away = np.where(distance[:, None] > 1e-3, away * side[:, None] / np.maximum(distance, 1e-3)[:, None], smooth)
+        return np.where(found, side * distance, np.inf), away, far[:, 0]
 
-    def signed(self, points):
-        """(n,) mm to the surface, negative inside a closed one."""
-        height, _, far = self.height(points)
-        return np.where(height < 0, -far, far)
+    def about(self, points):
+        """(n,) mm to the nearest sample, negative inside, infinite beyond 3 mm: quick and rough."""
+        far, near = self._tree.query(points, distance_upper_bound=3.0)
+        near = np.where(np.isfinite(far), near, 0)
+        inside = ((points - self.points[near]) * self.normals[near]).sum(1) < 0
+        return np.where(inside & np.isfinite(far), -far, far)
 
     def nearest(self, points):
         """(n, 3) mm: the sample nearest to each point."""
