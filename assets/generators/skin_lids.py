@@ -46,7 +46,16 @@ def place_lids(layout, x, head):
 
 #: Visible edge of the lids at rest in mm from the eye's centre, (to the side, up): inner corner first. The upper lid
 #: covers 1.5 mm of the iris, the lower touches it (oculoplastic texts); MRD1 and MRD2 as in Malik et al. 2022.
-UPPER_EDGE = [(-14.4, -2.3), (-12.3, -0.5), (-8.8, 2.3), (-4.6, 4.1), (-0.6, 4.5), (4.0, 3.9), (8.0, 2.2), (12.3, -0.6)]
+UPPER_EDGE = [
+    (-14.4, -2.3),
+    (-12.3, -0.6),
+    (-8.8, 2.0),
+    (-4.6, 3.7),
+    (-0.6, 4.15),
+    (4.0, 3.6),
+    (8.0, 2.1),
+    (12.3, -0.6),
+]
 LOWER_EDGE = [
     (-14.4, -2.3),
     (-12.0, -3.1),
@@ -96,7 +105,7 @@ def finish_lids(layout: Layout, x: np.ndarray) -> None:
     ).reshape(-1, 1)
     rows = smooth[front]
     behind = np.unique(np.concatenate([ring[7], ring[8], patch[1, 1:-1]]))
-    room = np.where(np.isin(behind, ring[7]), 0.36, 0.7)
+    room = np.where(np.isin(behind, ring[7]), 0.4, 0.75)
     lining, margin = smooth[behind], smooth[on_ball]
     for _ in range(24):
         x[front] += firm * (want - rows @ x) + 0.08 * (want - x[front])
@@ -154,13 +163,15 @@ def _margins(inner, outer, above):
 def _lid_skin(rim, orbit, inner, outer, above):
     """Tarsal plate, crease and fold of the upper lid; plate, roll and groove of the lower one: (24, 3) each."""
     start = np.arctan2(rim[:, 2], -rim[:, 1])
+    apart = np.hypot(rim[:, 1], rim[:, 2])
 
     def over(length, height, share):
         """``length`` mm from the edge and ``height`` mm over the ball, going ``share`` of the way to the orbit sideways."""
         side = lerp(rim[:, 0], orbit[:, 0], share)
         angle = start + np.where(above, 1, -1) * length / (RADIUS + 2)
         depth = np.sqrt(np.maximum((RADIUS + height) ** 2 - side**2, 4))
-        depth = np.maximum(depth, np.hypot(rim[:, 1], rim[:, 2]) + height - THICKNESS)  # the corners leave the ball
+        stand = apart + height - THICKNESS - np.clip(1.6 * (inner - 9), 0, 3.2)
+        depth = np.maximum(depth, stand)  # the corners leave the ball
         return np.stack([side, -depth * np.cos(angle), depth * np.sin(angle)], axis=1)
 
     def table(up, low):
@@ -169,15 +180,18 @@ def _lid_skin(rim, orbit, inner, outer, above):
 
     plate = over(table([1] * 9, [1] * 9), np.full(24, 2.0), np.full(24, 0.06))
     crease = over(
-        table([1.6, 2.2, 2.7, 3.4, 3.7, 3.6, 2.9, 2.2, 1.6], [2.5, 2.8, 3.3, 3.8, 4.0, 4.0, 3.7, 3.2, 2.5]),
-        table([2.4] * 9, [2.45] * 9),
+        table([1.6, 2.2, 2.7, 3.4, 3.7, 3.6, 2.9, 2.2, 1.6], [2.5, 2.8, 3.4, 4.0, 4.3, 4.3, 3.9, 3.3, 2.5]),
+        table([2.4] * 9, [2.7] * 9),
         np.full(24, 0.22),
     )
     fold = over(
-        table([2, 2.3, 2.6, 2.9, 3.0, 3.1, 3.4, 3.5, 3.2], [4.5, 5, 5.8, 6.8, 7.1, 7.1, 6.6, 5.8, 5]),
-        table([3.2, 3.6, 4.2, 4.6, 4.7, 4.6, 3.8, 3.1, 2.6], [2.8, 3, 3.2, 3.5, 3.5, 3.4, 2.9, 2.5, 2.4]),
+        table([2, 2.3, 2.6, 2.9, 3.0, 3.1, 3.4, 3.5, 3.2], [5] * 9),
+        table([3.2, 3.6, 4.2, 4.6, 4.7, 4.6, 3.8, 3.1, 2.6], [3] * 9),
         np.full(24, 0.42),
     )
+    # below, the roll passes into the cheek with a faint groove
+    middle = lerp(crease, orbit, np.full(24, 0.48))
+    fold = np.where(above[:, None], fold, middle * (1 + 0.15 / np.linalg.norm(middle, axis=1, keepdims=True)))
     straight = np.clip(
         (np.minimum(inner * np.where(above, 1, 0.5), outer * np.where(above, 1.4, 0.8)) - 0.2) / 2.2, 0, 1
     )

@@ -15,7 +15,7 @@ _AROUND, _RINGS = 12, 6
 #: Caruncle: (from the corner toward the eye, behind the corner, up) and its half sizes the same way, mm.
 _PLACE, _SIZE = (3.65, 1.8, 0.1), (1.65, 1.15, 1.1)
 #: Semilunar fold: angle from the caruncle along the ball, rad; half sizes (along, off the ball, up), mm.
-_FOLD, _FOLD_SIZE = 0.05, (0.8, 0.35, 1.55)
+_FOLD, _FOLD_SIZE = 0.05, (0.9, 0.3, 1.5)
 
 
 def caruncle(eye: Eye, corner: np.ndarray) -> Mesh:
@@ -42,8 +42,8 @@ def caruncle_vertices(eye: Eye, corner: np.ndarray) -> np.ndarray:
     lift = eye.radius + size * (0.25 + _FOLD_SIZE[1])
     egg = _egg() * (size * np.array(_FOLD_SIZE))
     bow = (egg[:, 2] / (size * _FOLD_SIZE[2])) ** 2
-    angle = polar - (egg[:, 0] + 0.5 * size * bow) / eye.radius
-    height = toward @ up + 0.2 * size + egg[:, 2]
+    angle = polar - (egg[:, 0] * (1 - 0.5 * bow) - 0.25 * size * bow) / eye.radius
+    height = toward @ up + 0.1 * size + egg[:, 2]
     radius = np.sqrt(np.maximum((lift + egg[:, 1]) ** 2 - height**2, 1.0))
     second = (
         eye.centre
