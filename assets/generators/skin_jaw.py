@@ -83,9 +83,6 @@ def jaw_weights(p, vertices: np.ndarray) -> np.ndarray:
     lips = 0.5 - 0.5 * above * np.array(_OVAL)[away]
     lining = 0.5 - 0.5 * above * np.array(_LINING)[away]
     out = _cheek(layout, vertices)
-    for hole in ("eye_l", "eye_r", "ear_l", "ear_r", "nostril_l", "nostril_r"):
-        out[layout.rings[hole]] = 0
-        out[layout.patches[hole]] = 0
     mouth = np.zeros(layout.count, bool)
     mouth[ring[2:]], mouth[patch] = True, True
     degree = np.asarray(p.plain.sum(axis=1)).ravel()
@@ -96,5 +93,8 @@ def jaw_weights(p, vertices: np.ndarray) -> np.ndarray:
     out[patch[1, 1:-1]] = 0.5
     for _ in range(1):
         out = np.where(mouth, out, 0.5 * out + 0.5 * (p.plain @ out) / degree)
-    out[out < 0.004] = 0
+    out[(out < 0.004) & ~mouth] = 0
+    for hole in ("eye_l", "eye_r", "ear_l", "ear_r", "nostril_l", "nostril_r"):
+        out[layout.rings[hole]] = 0
+        out[layout.patches[hole]] = 0
     return out

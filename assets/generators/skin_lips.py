@@ -21,8 +21,8 @@ LIP_DEPTH = ([0, 6, 12, 19, 24.6], [-99.2, -98.9, -96.8, -92.0, -87.2])
 # 7.5 and 8.7 mm high, mouth 49 mm wide, philtrum 12.4 mm). Nine numbers go from the corner (0) to the middle (8).
 
 #: mm from the midline of the red border, of the middle of the red, of the lips' edge and of the line where they meet.
-_X3 = (24.5, 21.6, 18.6, 15.5, 12.4, 9.3, 6.1, 2.9, 0)
-_X4 = (24.2, 21.2, 18.2, 15.1, 12.1, 9.0, 6.0, 3.0, 0)
+_X3 = (25.1, 21.6, 18.6, 15.5, 12.4, 9.3, 6.1, 2.9, 0)
+_X4 = (24.6, 21.2, 18.2, 15.1, 12.1, 9.0, 6.0, 3.0, 0)
 _X5 = (23.8, 20.8, 17.8, 14.8, 11.8, 8.9, 5.9, 2.95, 0)
 _X6 = (23.5, 20.5, 17.5, 14.6, 11.7, 8.8, 5.85, 2.9, 0)
 
@@ -53,20 +53,21 @@ _EDGE_GAP = (0, 0.15, 0.22, 0.2, 0.17, 0.15, 0.15, 0.15, 0.15)
 #: The surface they touch in arches, so that no straight look gets through: mm up at edge, line and back.
 _STEP = (-0.8, 0.6, -0.8)
 
-#: Philtrum on the two rows of skin above the lip, from the middle sideways, groove to column to cheek: mm from the
+#: Philtrum on the three rows of skin above the lip, from the middle sideways, groove to column to cheek: mm from the
 #: midline, mm behind the middle of the upper border, and how far these numbers rule over what was measured.
 _PHILTRUM = {
-    1: ((0, 2.7, 5.5, 9.2), (3.0, 2.7, 1.9, 2.6), (1, 1, 1, 0.5)),
-    2: ((0, 2.8, 5.9, 9.2), (1.5, 1.2, 0.6, 1.9), (1, 1, 1, 0.6)),
+    0: ((0, 4.2, 8.5, 13.0), (2.1, 2.3, 3.4, 6.6), (0.5, 0.7, 0.8, 0.7)),
+    1: ((0, 3.5, 7.0, 11.4), (3.0, 2.8, 2.1, 3.6), (1, 1, 1, 0.6)),
+    2: ((0, 3.0, 6.2, 9.4), (1.5, 1.2, 0.6, 1.9), (1, 1, 1, 0.6)),
 }
 
 #: mm between the red's border and the next row of skin, as a share of what was measured: near, for a crisp border; and
 #: how much of the border's way the row beyond it follows.
-_NEAR, _FOLLOW = 0.85, 0.25
+_NEAR, _FOLLOW = 0.78, 0.25
 
 
 #: How eagerly the cage stands out so that the limit surface comes where each row belongs; too much would fold it.
-_TRUE = {1: 0.5, 2: 0.25, 3: 0.6, 4: 0.9}
+_TRUE = {1: [0, 0.5, 0], 2: [0, 0.4, 0.1], 3: [0.6, 0.6, 0.6], 4: [0.9, 0.9, 0.9]}
 
 
 def lip_places():
@@ -142,15 +143,16 @@ def finish_lips(layout: Layout, x: np.ndarray) -> None:
             place[corner, 2] = meet[corner, 2] - flat @ normal[:2] / normal[2]
     near = border + _NEAR * (old[2] - old[3])
     beyond = old[1] + _FOLLOW * (border - old[3])
+    x[ring[0]] = _with_philtrum(0, old[0], origin)
     target = {1: _with_philtrum(1, beyond, origin), 2: _with_philtrum(2, near, origin), 3: border, 4: red}
     for k, place in (*target.items(), (5, edge), (6, meet), (7, back)):
         x[ring[k]] = place
-    eager = np.interp(away, [0, 1, 2], [0.3, 0.8, 1])  # where rows crowd into the corner it would fold
+    eager = np.interp(away, [0, 1, 2], [0, 0.7, 1])  # where rows crowd into the corner it would fold
     smooth = limit(layout.faces, layout.count)
     for _ in range(4):
         now = smooth @ x
         for k, place in target.items():
-            x[ring[k]] += eager[:, None] * _TRUE[k] * (place - now[ring[k]])
+            x[ring[k]] += eager[:, None] * np.array(_TRUE[k]) * (place - now[ring[k]])
 
 
 def _with_philtrum(k, row, origin):
