@@ -41,10 +41,10 @@ def _smooth_outside(layout: Layout, x: np.ndarray) -> np.ndarray:
 def _behind_ear(layout: Layout, x: np.ndarray) -> np.ndarray:
     """The auricle pulls on the few vertices behind it: smooth there again."""
     weight = np.zeros(layout.count)
-    for v in range(4, 20):
-        for u in range(17, HALF + 1):
+    for v in range(1, 20):
+        for u in range(14, HALF + 1):
             near = layout.grid[v, [u % (2 * HALF), -u % (2 * HALF)]]
-            weight[near[near >= 0]] = np.interp(v, [3, 6, 17, 20], [0, 1, 1, 0]) * np.interp(u, [16, 18], [0, 1])
+            weight[near[near >= 0]] = np.interp(v, [0, 3, 17, 20], [0, 1, 1, 0]) * (v < 7 or u > 18)
     for side in ("_l", "_r"):
         weight[layout.rings["ear" + side][0]] = 0
     return fair(layout, x, weight, 13.0)

@@ -78,10 +78,25 @@ class _Finder:
 
     def between(self, first, second, share):
         """The point of an edge, ``share`` of the way from one grid place to the next."""
-        a, b = (self.layout.grid[v, u] for u, v in (first, second))
+        return self.on_edge(*(self.layout.grid[v, u] for u, v in (first, second)), share)
+
+    def on_edge(self, a, b, share):
+        """The same between two vertices."""
         row = self.all[(self.all == a).any(axis=1) & (self.all == b).any(axis=1)][0]
         third = row[(row != a) & (row != b)][0]
         return np.array([a, b, third]), np.array([1 - share, share, 0.0])
+
+    def apex(self, line, score):
+        """Where a line of vertices is highest by score(positions): top of the parabola through the three about it."""
+        line = np.asarray(line)
+        line = line[line >= 0]
+        at = self.vertices[line]
+        k = int(np.clip(np.argmax(score(at)), 1, len(line) - 2))
+        height, s = score(at)[k - 1 : k + 2], np.linalg.norm(np.diff(at[k - 1 : k + 2], axis=0), axis=1)
+        bend, slope, _ = np.polyfit([-s[0], 0, s[1]], height, 2)
+        top = float(np.clip(-slope / (2 * bend), -s[0], s[1])) if bend < 0 else 0.0
+        other = line[k - 1] if top < 0 else line[k + 1]
+        return self.on_edge(line[k], other, abs(top) / s[0 if top < 0 else 1])
 
     def extreme(self, candidates, score):
         """The candidate vertex with the greatest score(positions)."""
@@ -102,16 +117,14 @@ def skin_landmarks(
     found = {name: f.place(place) for name, place in PLACES.items()}
     found |= {name: f.near(point) for name, point in seeds.items()}
     crown = layout.crown[:, layout.crown.shape[1] // 2]
-    found["v"] = f.extreme(np.r_[crown, f.front[:2]], lambda p: p[:, 2])
-    found["op"] = f.extreme(f.back, lambda p: np.where(p[:, 2] > -20, p[:, 1], -np.inf))
+    found["v"] = f.apex(crown, lambda p: p[:, 2])
+    found["op"] = f.apex(f.back, lambda p: np.where(p[:, 2] > -20, p[:, 1], -np.inf))
     found["tr"] = f.between((0, 1), (0, 0), 0.75)
-    found["se"] = f.between((0, 6), (0, 7), 0.5)
-    found["prn"] = f.extreme(f.front[10:15], lambda p: -p[:, 1])
-    found["sl"] = f.extreme(
-        np.r_[f.front[22], layout.rings["mouth"][1:3, 11], f.front[23]],
-        lambda p: p[:, 1],
-    )
-    found["pg"] = f.extreme(f.front[22:26], lambda p: -p[:, 1])
+    found["se"] = f.apex(f.front[5:10], lambda p: p[:, 1])
+    found["prn"] = f.apex(f.front[10:15], lambda p: -p[:, 1])
+    mouth = layout.rings["mouth"]
+    found["sl"] = f.extreme(np.r_[mouth[1:3, 11], f.front[22:24]], lambda p: p[:, 1])
+    found["pg"] = f.apex(f.front[22:26], lambda p: -p[:, 1])
     found["gn"] = f.place((0, 25))
     found["sbal"] = f.near(0.5 * (vertices[layout.grid[15, 2]] + vertices[layout.grid[15, 3]]))
     grid = layout.grid
