@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Broad forms that averaging flattens are raised again: bone and muscle that show through the skin.
+"""Broad forms of the face that averaging flattens are raised again: brow, temple, cheekbone, folds, chin and jaw.
 
 Each form is a line of a few points near the mean head's surface with a height in mm at each, spread over a width like
 a Gaussian; the skin moves along its normals. Negative heights are hollows. Our own numbers, set by eye against surface
-anatomy (superficial landmarks as in Gray's Anatomy, 41st ed., chapters 30 and 31).
+anatomy (Gray's Anatomy, 41st ed., chapter 30).
 """
 
 from dataclasses import dataclass
@@ -11,8 +11,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...sim.mesh import Mesh, vertex_normals
-from .skin_bust import bust_columns
-from .skin_curves import unit
 from .skin_fit import outer_skin
 from .skin_layout import Layout
 
@@ -42,19 +40,7 @@ FORMS = (
     Form("mentolabial fold", 4.5, ((0, -85, -72, -0.7), (14, -82, -73, -0.5), (22, -77, -76, 0))),
     Form("jaw line", 6.0, ((24, -70, -90, 0.3), (42, -45, -76, 0.7), (54, -22, -64, 0.5), (58, -10, -55, 0.3))),
     Form("under the jaw", 8.0, ((20, -52, -100, -0.8), (38, -28, -92, -1.0), (50, -6, -80, -0.7))),
-    # neck
-    Form("sternocleidomastoid", 7.0, ((63, 16, -40, 1.0), (54, 12, -75, 2.0), (40, 3, -105, 2.5), (24, 0, -132, 2.9),
-                                      (11, 0, -154, 2.7))),
-    Form("behind it", 9.0, ((58, 34, -95, -1.1), (50, 26, -120, -2.2), (42, 16, -143, -2.9))),
-    Form("beside the throat", 7.0, ((18, -14, -118, -1.3), (13, -6, -136, -1.3))),
-    Form("larynx", 6.0, ((0, -17, -119, 1.6), (0, -13, -128, 1.4))),
-    Form("trapezius", 12.0, ((50, 52, -98, 0.8), (72, 58, -122, 0.9))),
 )  # fmt: skip
-
-#: By column of the bust from the midline: how far the clavicle's row stands out, and how deep the row above it lies
-#: (notch above the breastbone, then the hollow over the clavicle), mm.
-_CLAVICLE = (-0.8, 2.2, 3.4, 3.4, 3.2, 3.0, 2.6, 2.2, 1.6, 0.8, 0)
-_ABOVE_CLAVICLE = (-3.2, -0.6, 0.2, -1.6, -2.8, -3.2, -3.0, -2.2, -1.2, -0.5, 0)
 
 
 def _share(points: np.ndarray, form: Form) -> np.ndarray:
@@ -72,16 +58,11 @@ def _share(points: np.ndarray, form: Form) -> np.ndarray:
 
 
 def raise_forms(layout: Layout, x: np.ndarray) -> None:
-    """`FORMS` and the clavicles on the left side and the midline of (n, 3) mm, in place."""
+    """`FORMS` on the left side and the midline of (n, 3) mm, in place."""
     normal = vertex_normals(x, Mesh(x, layout.faces).triangles)
     outer = outer_skin(layout)
     outer[layout.grid[layout.grid >= 0]] = True
     height = np.zeros(len(x))
     for form in FORMS:
         height += _share(x, form)
-    columns = bust_columns(layout)
-    out = x + (height * outer)[:, None] * normal
-    for row, mm in ((5, _CLAVICLE), (4, _ABOVE_CLAVICLE)):
-        at = columns[: len(mm), row]
-        out[at] += np.array(mm)[:, None] * unit(normal[at])
-    x[:] = out
+    x += (height * outer)[:, None] * normal
