@@ -6,17 +6,19 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from headshop.sim.adapt.build import build_head, fit_report
-from headshop.sim.adapt.carry import carry
 from headshop.sim.adapt.closest import Surface
 from headshop.sim.adapt.fine_fit import folded
+from headshop.sim.adapt.follow import follow
 from headshop.sim.adapt.landmarks import read_landmarks
 from headshop.sim.adapt.openings import rims
+from headshop.sim.adapt.rest import rest_of
 from headshop.sim.adapt.skin_fit import fit_skin
-from headshop.sim.adapt.untangle import pierced, untangled
+from headshop.sim.adapt.untangle import untangled
 from headshop.sim.anatomy.inside import winding_number
 from headshop.sim.anatomy.landmark_names import mirrored
 from headshop.sim.errors import InputError
 from headshop.sim.mesh import Mesh, edges
+from headshop.sim.mesh_piercing import self_piercings
 from headshop.sim.mesh_subdivision import subdivision
 from headshop.sim.progress import Progress, finish
 from headshop.sim.scan.clean import clean_scan
@@ -107,28 +109,17 @@ def test_no_triangle_turned_over(reference, built, subject):
 
 
 def test_the_skin_pierces_itself_nowhere(reference, built):
-    first, _ = pierced(built[0].head.skin.vertices, reference.skin.triangles)
-    assert len(first) <= len(pierced(reference.skin.vertices, reference.skin.triangles)[0])
+    assert len(self_piercings(built[0].head.skin.vertices, reference.skin.triangles)) == 0
 
 
 def test_tangles_are_found_and_undone(reference):
     skin = reference.skin
-    seen = np.asarray(reference.groups["inner"]) < 0.5
     pushed = skin.vertices.copy()
     pushed[np.asarray(reference.groups["lip_upper"]) > 0.5] += [0, 2.0, -8.0]  # through the lower lip
-    assert len(pierced(pushed, skin.triangles)[0]) > 0
-    mended = untangled(skin.vertices, pushed, skin.faces, skin.triangles, np.zeros_like(seen))
-    assert len(pierced(mended, skin.triangles)[0]) == 0
+    assert len(self_piercings(pushed, skin.triangles)) > 0
+    mended = untangled(rest_of(reference), pushed, np.zeros(len(pushed), dtype=bool))
+    assert len(self_piercings(mended, skin.triangles)) == 0
     assert np.linalg.norm(mended - skin.vertices, axis=1).max() < 3
-
-
-def test_piercing_is_told_exactly():
-    flat = np.array([[0, 0, 0], [10, 0, 0], [0, 10, 0.0]])
-    through = np.array([[2, 2, -3], [3, 2, 3], [2, 3, 3.0]])
-    beside = through + [20, 0, 0]
-    triangles = np.arange(6).reshape(2, 3)
-    assert len(pierced(np.concatenate([flat, through]), triangles)[0]) == 1
-    assert len(pierced(np.concatenate([flat, beside]), triangles)[0]) == 0
 
 
 def test_lips_stay_together_and_lids_on_the_eyes(reference, built):
@@ -206,7 +197,7 @@ def test_the_same_scan_moved_gives_the_same_head_moved(reference, coarse):
     there, _ = _fitted(
         reference, scan.moved(scan.vertices @ turn.T + shift), {n: turn @ p + shift for n, p in marks.items()}
     )
-    one, other = finish(carry(reference, here)).head, finish(carry(reference, there)).head
+    one, other = (finish(follow(reference, f.fitted.vertices, f.closed, f.unseen)).head for f in (here, there))
     for part in one.parts:
         off = np.linalg.norm((other.parts[part].vertices - shift) @ turn - one.parts[part].vertices, axis=1)
         assert off.max() < 0.1, part

@@ -11,10 +11,11 @@ from ..errors import InputError
 from ..mesh import Mesh
 from ..progress import Progress, Work, portion
 from .bone import depth_under
-from .carry import BONES, carry
 from .closest import Surface
+from .follow import follow
 from .gate import check_against_scan, check_arrangement
 from .landmarks import require_usable
+from .rest import BONES
 from .skin_fit import SkinFit, fit_skin, group
 
 REACH = 20.0  # mm: bone deeper under the skin than this is not measured
@@ -59,9 +60,9 @@ def build_head(reference: Head, scan: Mesh, landmarks: dict[str, np.ndarray]) ->
     check_arrangement(reference.landmark_positions(), given)
     fit = yield from portion(fit_skin(reference, target, given), 0.1, 0.7)
     refuse_poor(fit_report(reference, fit, given))
-    carried = yield from portion(carry(reference, fit), 0.7, 0.95)
+    followed = yield from portion(follow(reference, fit.fitted.vertices, fit.closed, fit.unseen), 0.7, 0.95)
     yield Progress(0.95, "Checking the anatomy")
-    head = carried.head
+    head = followed.head
     report = fit_report(reference, fit, given, head.skin.vertices)
     anatomy = anatomy_report(head)
     missing = tuple(n for n in SKIN if n not in given)

@@ -10,6 +10,7 @@ from .bone import BONES
 
 NEAR = 15.0
 SLACK = 0.3  # mm: bellies rest on bone, so less than this inside it is no fault
+TOUCH = 0.05  # mm: the same for the skin and the lining of the mouth
 
 
 def muscle_room(head: Head) -> dict[str, tuple[float, float]]:
@@ -27,4 +28,4 @@ def muscle_room(head: Head) -> dict[str, tuple[float, float]]:
         deep, found = depth_under(points, bone, NEAR)
         dip = np.maximum(dip, np.where(found.found, deep, 0))
     worst = [(float(out[owner == k].max()), float(dip[owner == k].max())) for k in range(len(head.muscles))]
-    return {m.name: w for m, w in zip(head.muscles, worst, strict=True) if w[0] > 0 or w[1] > SLACK}
+    return {m.name: w for m, w in zip(head.muscles, worst, strict=True) if w[0] > TOUCH or w[1] > SLACK}

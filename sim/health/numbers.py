@@ -26,7 +26,7 @@ LIMITS: dict[str, tuple[float | None, float | None]] = {
     "bone cover": (1.0, None),
     "bone to lining": (0.0, None),
     "muscles out of room": (0, 0),
-    "muscle out of skin": (0, 0),
+    "muscle out of skin": (0, muscles.TOUCH),
     "muscle in bone": (0, muscles.SLACK),
     "uv overlaps": (0, 0),
     "uv turned over": (0, 0),

@@ -7,12 +7,14 @@ Among all fields that change the measurements as drawn, the smoothest is taken: 
 """
 
 import csv
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from ..anatomy.head import Eye, Head, moved_muscles_and_jaw
+from ..adapt.follow import follow
+from ..anatomy.head import Head
+from ..progress import finish
 
 TABLE = Path(__file__).resolve().parents[2] / "assets" / "tables" / "face_variation.csv"
 
@@ -24,8 +26,6 @@ SIZE_SHARE = 0.35
 SLACK = 0.12
 #: Left and right differ by about this much, mm, over patches of this reach.
 ASYMMETRY, PATCH = 0.55, 32.0
-#: Within this distance of the eyeball the skin keeps its distance to it, mm; beyond the second it is free.
-EYE_NEAR, EYE_FAR = 2.5, 11.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,53 +45,26 @@ class Field:
 
 
 def draw_field(landmarks: dict[str, np.ndarray], rng: np.random.Generator, strength: float = 1.0) -> Field:
-    """The field of one random person; ``strength`` 1 is the variance of the norms, 0 the reference itself."""
-    points, functionals, deviations, of = _functionals(landmarks)
+    """The field of one random woman or man; ``strength`` 1 is the variance of the norms, 0 the reference itself."""
+    points, functionals, deviations, sexes, of = _functionals(landmarks)
     draws = np.sqrt(1 - SIZE_SHARE) * rng.standard_normal(of.max() + 1) + np.sqrt(SIZE_SHARE) * rng.standard_normal()
     target = strength * np.clip(draws, -2.2, 2.2)[of] * deviations  # beyond, people look odd
     kernel = _kernel(points, points)
     gram = sum(functionals[:, :, k] @ kernel @ functionals[:, :, k].T for k in range(3))
-    weights = np.linalg.solve(gram + SLACK**2 * np.diag(np.diag(gram)), target)
     positions = np.array(list(landmarks.values()))
     patches = positions[rng.choice(len(positions), 14, replace=False)]
-    return Field(
-        points,
-        np.einsum("a,apk->pk", weights, functionals),
-        patches,
-        strength * ASYMMETRY * rng.standard_normal(patches.shape),
-    )
+    uneven = strength * ASYMMETRY * rng.standard_normal(patches.shape)
+    # The reference is the mean of both sexes, so either is half the difference away.
+    target = target + strength * rng.choice([-0.5, 0.5]) * sexes
+    weights = np.linalg.solve(gram + SLACK**2 * np.diag(np.diag(gram)), target)
+    return Field(points, np.einsum("a,apk->pk", weights, functionals), patches, uneven)
 
 
 def individual(reference: Head, rng: np.random.Generator, strength: float = 1.0) -> Head:
-    """A person: every part of ``reference`` displaced by one random field; eyeballs stay round, lids stay on them."""
+    """A person: the skin of ``reference`` displaced by one random field, and all that lies under it following."""
     field = draw_field(reference.landmark_positions(), rng, strength)
-    balls = [(eye, field(eye.centre[None])[0]) for eye in reference.eyes]
-
-    def moved(points):
-        points = np.asarray(points, dtype=float)
-        flat = points.reshape(-1, 3)
-        out = flat + field(flat)
-        for eye, shift in balls:
-            out = _keep_on_ball(flat, out, eye, shift)
-        return out.reshape(points.shape)
-
-    parts = {name: moved(mesh.vertices) for name, mesh in reference.parts.items()}
-    for name, (_, shift) in zip(("eye_l", "eye_r"), balls, strict=True):
-        parts[name] = reference.parts[name].vertices + shift
-    muscles, jaw = moved_muscles_and_jaw(reference, moved)
-    eyes = tuple(Eye(eye.centre + shift, eye.radius, eye.gaze) for eye, shift in balls)
-    return replace(reference.with_vertices(parts), muscles=muscles, jaw=jaw, eyes=eyes)
-
-
-def _keep_on_ball(before, after, eye, shift):
-    """Near the eyeball the distance to it is as it was: the lids neither sink in nor stand off."""
-    was = np.linalg.norm(before - eye.centre, axis=1)
-    ray = after - (eye.centre + shift)
-    now = np.linalg.norm(ray, axis=1)
-    free = np.clip((was - eye.radius - EYE_NEAR) / (EYE_FAR - EYE_NEAR), 0, 1)
-    free = free * free * (3 - 2 * free)
-    length = was + free * (now - was)
-    return eye.centre + shift + ray * (length / np.maximum(now, 1e-9))[:, None]
+    skin = reference.skin.vertices
+    return finish(follow(reference, skin + field(skin))).head
 
 
 def _squared(a, b):
@@ -104,11 +77,12 @@ def _kernel(a, b):
 
 
 def _functionals(landmarks):
-    """Points (p, 3), functionals (a, p, 3) of displacements there, deviations (a,) mm, row of the table (a,).
+    """Points (p, 3), functionals (a, p, 3) of displacements there; (a,) mm each: deviations, and men's mean less
+    women's; row of the table (a,).
 
     A row with * stands for both sides, which are drawn alike.
     """
-    points, index, rows, deviations, of = [], {}, [], [], []
+    points, index, rows, deviations, sexes, of = [], {}, [], [], [], []
 
     def at(text):
         """The indices of the points in ``text``: landmarks, or the middle of several joined by +."""
@@ -138,10 +112,11 @@ def _functionals(landmarks):
                 direction = (-1.0 if axis[0] == "-" else 1.0) * np.eye(3)["xyz".index(axis[-1])]
             rows.append((ends, direction))
             deviations.append(float(row["sd_mm"]))
+            sexes.append(float(row["sex_mm"]))
             of.append(number)
     functionals = np.zeros((len(rows), len(points), 3))
     for k, (ends, direction) in enumerate(rows):
         for end, share in zip(ends, (1.0, -1.0), strict=True):
             for i in end:
                 functionals[k, i] += share * direction / len(end)
-    return np.array(points), functionals, np.array(deviations), np.array(of)
+    return np.array(points), functionals, np.array(deviations), np.array(sexes), np.array(of)

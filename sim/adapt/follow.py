@@ -1,0 +1,136 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Everything under the skin follows it: bone, eyes, teeth, tongue, muscles (Kähler et al. 2002, section 5.2).
+
+The skin may have been moved by anything: fitted to a scan, varied at random, grown. No step of this is manual: bone
+keeps its tissue depths, eyeballs stay spheres under the lids, teeth stay rigid behind the lips, and what lines the
+mouth and the lids goes with them.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..anatomy.head import Head
+from ..anatomy.tissue_depth import tissue_vectors
+from ..progress import Progress, Work
+from . import bone, eyeballs
+from .closest import Surface
+from .lining import lined
+from .mouth import TEETH, mouth_similarity, near_bone
+from .muscles import carried_muscles
+from .openings import lids_apart, lips_apart, sealed_lids
+from .rest import BONES, Rest, rest_of
+from .skin_fit import group
+from .thin_plate_spline import similarity
+from .untangle import restored, untangled
+
+AROUND_EYE = 32.0  # mm: bone this near carries the eye
+
+
+@dataclass(frozen=True, eq=False)
+class Followed:
+    """head : the whole head; moved : mm by which bone had to give way to the skin (largest)."""
+
+    head: Head
+    moved: float
+
+
+def follow(reference: Head, skin: np.ndarray, closed=(), unseen: np.ndarray | None = None) -> Work:
+    """Work returning `Followed`: ``reference`` under another skin.
+
+    Parameters
+    ----------
+    reference : the head that was warped
+    skin : (n, 3) mm, its skin after the warp; the linings of mouth, lids and nostrils in it are not looked at
+    closed : sides (``l``, ``r``) of eyes that are shut
+    unseen : (n,) bool, vertices that are to have the reference's own shape (None: none)
+    """
+    rest = rest_of(reference)
+    start = reference.skin.vertices
+    seen = ~rest.inner
+    unseen = np.zeros(len(start), dtype=bool) if unseen is None else unseen
+    size, _ = similarity(start[seen], skin[seen])
+    scale = float(np.cbrt(np.linalg.det(size)))
+
+    yield Progress(0.0, "Skull")
+    space = rest.space(skin)
+    parts = {name: space.transform(reference.parts[name].vertices) for name in BONES}
+    parts = bone_by_depth(reference, parts, skin, size / scale, scale)
+
+    yield Progress(0.25, "Eyes and teeth")
+    eyes, carried = [], {}
+    for k, side in enumerate("lr"):
+        old = reference.eyes[k]
+        around = near_bone(rest, parts, old.centre[None], AROUND_EYE)
+        new, turn = eyeballs.place_eye(old, around, start, skin, rest.lids(side), rest.inner, scale)
+        eyes.append(new)
+        carried[f"eye_{side}"] = eyeballs.eye_similarity(old, new, turn)
+        parts[f"eye_{side}"] = carried[f"eye_{side}"](reference.parts[f"eye_{side}"].vertices)
+    mouth = carried["mouth"] = mouth_similarity(rest, parts, skin)
+    for name in (*TEETH, "tongue"):
+        parts[name] = mouth(reference.parts[name].vertices)
+
+    yield Progress(0.35, "Inner skin")
+    final = np.array(skin, dtype=float)
+    for organ in rest.organs:
+        final = lined(rest, final, organ, carried.get(organ))
+    final = lips_apart(reference, final, rest.inner, size)
+    for eye, side in zip(eyes, "lr", strict=True):
+        if side in closed:
+            marks = reference.landmarks.on({"skin": skin})
+            final = lids_apart(reference, rest.rim, final, marks, size[:, 2], side)
+            final = sealed_lids(reference, rest.rim, final, eye, side)
+        final = eyeballs.lids_on_eye(rest, final, parts[f"eye_{side}"], eye, side)
+
+    yield Progress(0.45, "Untangle the skin")
+    lining = np.maximum(group(reference, "lip_upper"), group(reference, "lip_lower")) > 0.3
+    shut = rest.rim & lining  # where lips meet is seen, a fold behind them is not
+    for side in closed:  # closed lids lie too close for the reference's open ones to be restored
+        shut |= rest.lids(side) > 0.2
+    final = restored(rest, final, unseen, scale)
+    parts["skin"] = final = untangled(rest, final, seen & ~unseen, shut)
+
+    yield Progress(0.5, "Bone under the skin")
+    surface = Surface(final, reference.skin.triangles)
+    moved = 0.0
+    for name in BONES:
+        before = parts[name]
+        parts[name] = bone.keep_inside(reference.parts[name].moved(before), surface, rest.needs[name] * min(scale, 1.0))
+        moved = max(moved, float(np.linalg.norm(parts[name] - before, axis=1).max()))
+    jaw = carried_jaw(rest, parts, mouth, scale)
+
+    yield Progress(0.8, "Muscles")
+    muscles = carried_muscles(rest, parts, rest.between(parts, final))
+    head = replace(reference.with_vertices(parts), muscles=muscles, jaw=jaw, eyes=tuple(eyes))
+    return Followed(head, moved)
+
+
+def bone_by_depth(reference: Head, parts, skin, turn, scale):
+    """Skull and mandible moved so that their landmarks lie a tissue depth under the skin's (5.2, item 2)."""
+    vertices = {**reference.vertices(), **parts, "skin": skin}
+    vectors = tissue_vectors(reference.landmark_positions(), reference.skull_landmark_positions())
+    # Soft tissue grows less than the head does: the depths of a small head shrink by half as much.
+    vectors = {name: (scale**0.5) * turn @ v for name, v in vectors.items()}
+    marks = reference.skull_landmarks.on(vertices)
+    landmarks = reference.landmarks.on(vertices)
+    return {name: bone.follow_skin(parts[name], marks, landmarks, vectors) for name in parts}
+
+
+def carried_jaw(rest: Rest, parts, mouth, scale: float):
+    """The hinge on the moved mandible: condyles with the bone around them, the incisor with the teeth."""
+    old = rest.head.jaw
+    source, target = rest.head.parts["mandible"].vertices, parts["mandible"]
+    condyles = []
+    for point in (old.condyle_l, old.condyle_r):
+        near = np.argsort(np.linalg.norm(source - point, axis=1), kind="stable")[:16]
+        weight = 1 / (1.0 + np.linalg.norm(source[near] - point, axis=1))
+        condyles.append(point + weight @ (target[near] - source[near]) / weight.sum())
+    return replace(
+        old,
+        condyle_l=condyles[0],
+        condyle_r=condyles[1],
+        incisor=mouth(old.incisor[None])[0],
+        slide_max=old.slide_max * scale,
+        side_max=old.side_max * scale,
+        forward_max=old.forward_max * scale,
+    )

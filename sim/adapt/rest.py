@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How the parts of the reference head lie to each other: what following a warped skin needs to know, found once."""
+
+from functools import lru_cache
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from ..anatomy.head import Head
+from ..mesh import edges
+from . import bone
+from .closest import Surface
+from .openings import rims
+from .refine import scattered, thinned
+from .skin_fit import group
+from .smooth_system import laplacian
+from .thin_plate_spline import System, ThinPlateSpline
+from .untangle import sharp
+
+BONES = ("skull", "mandible")
+COARSE = 14.0  # mm between centres of the warps, away from lids and lips
+#: Parts that carry what lies between the surfaces, and mm between the points of each that do.
+GAPS = (("skull", 18.0), ("mandible", 12.0), ("eye_l", 7.0), ("eye_r", 7.0), ("teeth_upper", 8.0), ("teeth_lower", 8.0))
+BUSY = ("lip_upper", "lip_lower") + tuple(f"{x}_{s}" for x in ("lid_upper", "lid_lower", "nostril") for s in ("l", "r"))
+
+
+@lru_cache(maxsize=2)
+def rest_of(reference: Head) -> "Rest":
+    """The `Rest` of a head, made once."""
+    return Rest(reference)
+
+
+class Rest:
+    """A reference head and what is known of it.
+
+    Attributes
+    ----------
+    head : the reference
+    inner, rim (n,) bool : skin that no scanner sees; the skin at its edge that is seen
+    outer (t, 3) : triangles of the skin that are seen
+    energy, link (n, n) : bending energy of a displacement of the skin, and its neighbours
+    folds : pairs of neighbouring triangles that turn back on each other
+    organs : ``eye_l``, ``eye_r``, ``mouth``, ``nostrils`` -> rows of the inner skin that belong to them
+    behind (n,) int : how many edges behind the rim a vertex of the inner skin lies, 0 for what is seen
+    needs : bone -> (k,) mm of tissue that must remain over each of its vertices
+    """
+
+    def __init__(self, reference: Head):
+        self.head = reference
+        skin = reference.skin
+        n = len(skin.vertices)
+        self.inner = group(reference, "inner") > 0.5
+        self.rim = rims(reference)
+        self.outer = skin.triangles[~self.inner[skin.triangles].any(axis=1)]
+        bend = laplacian(skin.vertices, skin.faces)
+        self.energy = (bend.T @ bend).tocsr()
+        a, b = edges(skin.faces).T
+        self.link = coo_matrix((np.ones(2 * len(a)), (np.r_[a, b], np.r_[b, a])), shape=(n, n)).tocsr()
+        self.folds = frozenset(map(tuple, sharp(skin.vertices, skin.triangles).tolist()))
+        self.organs, self.behind = self._organs()
+        self.needs = {name: self._needs(name) for name in BONES}
+        seen = np.flatnonzero(~self.inner)
+        even = seen[scattered(skin.vertices[seen], COARSE)]
+        self._even, self._space = even, System(skin.vertices[even], 1.0)
+        busy = np.zeros(n, dtype=bool)
+        for name in BUSY:
+            busy |= group(reference, name) > 0.3
+        far = seen[~busy[seen]]
+        self._pick = {"skin": np.concatenate([seen[busy[seen]], far[scattered(skin.vertices[far], COARSE)]])}
+        for name, gap in GAPS:
+            self._pick[name] = scattered(reference.parts[name].vertices, gap)
+        source = np.concatenate([reference.parts[name].vertices[pick] for name, pick in self._pick.items()])
+        self._keep = thinned(source, 0.2)
+        self._between = System(source[self._keep], 0.05)
+
+    def space(self, skin) -> ThinPlateSpline:
+        """The warp of space that takes the reference's seen skin to ``skin`` (n, 3) mm, a little smoothed."""
+        return self._space.solve(skin[self._even])
+
+    def between(self, parts, skin) -> ThinPlateSpline:
+        """The warp for what lies between the surfaces: seen skin (n, 3), bone, eyeballs and teeth all carry it.
+
+        parts : name -> (k, 3) mm
+        """
+        target = [(skin if name == "skin" else parts[name])[pick] for name, pick in self._pick.items()]
+        return self._between.solve(np.concatenate(target)[self._keep])
+
+    def lids(self, side: str) -> np.ndarray:
+        """(n,) weights of both lids of the eye ``side``."""
+        return np.maximum(group(self.head, f"lid_upper_{side}"), group(self.head, f"lid_lower_{side}"))
+
+    def _organs(self):
+        rows = np.flatnonzero(self.inner)
+        count, label = connected_components(self.link[rows][:, rows], directed=False)
+        organs = {"eye_l": [], "eye_r": [], "mouth": [], "nostrils": []}
+        for k in range(count):
+            part = rows[label == k]
+            if group(self.head, "mouth_bag")[part].max() > 0.5:
+                name = "mouth"
+            else:
+                name = next((f"eye_{s}" for s in "lr" if self.lids(s)[part].max() > 0.3), "nostrils")
+            organs[name].append(part)
+        behind = np.zeros(len(self.inner), dtype=int)
+        front = ~self.inner
+        step = 0
+        while not front.all():
+            step += 1
+            grown = front | (self.link @ front.astype(float) > 0)
+            if (grown == front).all():
+                break
+            behind[grown & ~front] = step
+            front = grown
+        return {n: np.sort(np.concatenate(p)) if p else np.zeros(0, int) for n, p in organs.items()}, behind
+
+    def _needs(self, name):
+        skin = self.head.skin
+        depth, found = bone.depth_under(
+            self.head.parts[name].vertices, Surface(skin.vertices, skin.triangles), bone.NEAR
+        )
+        # `Surface` welds, so the linings are told by the skin's own nearest vertex.
+        nearest = cKDTree(skin.vertices).query(np.where(found.found[:, None], found.points, 0.0))[1]
+        return bone.least_depth(depth, self.inner[nearest] & found.found)
