@@ -9,17 +9,18 @@ mouth and the lids goes with them.
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from ..anatomy.head import Head
 from ..anatomy.tissue_depth import tissue_vectors
 from ..progress import Progress, Work
 from . import bone, eyeballs
 from .closest import Surface
-from .lining import lined
-from .mouth import TEETH, mouth_similarity, near_bone
+from .lining import lined, lips_met
+from .mouth import mouth_similarity, with_teeth
 from .muscles import carried_muscles
-from .openings import lids_apart, lips_apart, sealed_lids
-from .rest import BONES, Rest, rest_of
+from .openings import lids_apart, sealed_lids
+from .rest import BONES, TEETH, Rest, rest_of
 from .skin_fit import group
 from .thin_plate_spline import similarity
 from .untangle import restored, untangled
@@ -56,9 +57,11 @@ def follow(reference: Head, skin: np.ndarray, closed=(), unseen: np.ndarray | No
     space = rest.space(skin)
     parts = {name: space.transform(reference.parts[name].vertices) for name in BONES}
     parts = bone_by_depth(reference, parts, skin, size / scale, scale)
+    mouth = mouth_similarity(rest, space, skin)
+    parts = {name: with_teeth(rest, name, moved, mouth) for name, moved in parts.items()}
 
     yield Progress(0.25, "Eyes and teeth")
-    eyes, carried = [], {}
+    eyes, carried = [], {"mouth": mouth}
     for k, side in enumerate("lr"):
         old = reference.eyes[k]
         around = near_bone(rest, parts, old.centre[None], AROUND_EYE)
@@ -66,15 +69,15 @@ def follow(reference: Head, skin: np.ndarray, closed=(), unseen: np.ndarray | No
         eyes.append(new)
         carried[f"eye_{side}"] = eyeballs.eye_similarity(old, new, turn)
         parts[f"eye_{side}"] = carried[f"eye_{side}"](reference.parts[f"eye_{side}"].vertices)
-    mouth = carried["mouth"] = mouth_similarity(rest, parts, skin)
     for name in (*TEETH, "tongue"):
         parts[name] = mouth(reference.parts[name].vertices)
 
     yield Progress(0.35, "Inner skin")
     final = np.array(skin, dtype=float)
+    final = lips_met(rest, final, size)
     for organ in rest.organs:
         final = lined(rest, final, organ, carried.get(organ))
-    final = lips_apart(reference, final, rest.inner, size)
+    final = lips_met(rest, final, size)
     for eye, side in zip(eyes, "lr", strict=True):
         if side in closed:
             marks = reference.landmarks.on({"skin": skin})
@@ -103,6 +106,20 @@ def follow(reference: Head, skin: np.ndarray, closed=(), unseen: np.ndarray | No
     muscles = carried_muscles(rest, parts, rest.between(parts, final))
     head = replace(reference.with_vertices(parts), muscles=muscles, jaw=jaw, eyes=tuple(eyes))
     return Followed(head, moved)
+
+
+def near_bone(rest: Rest, parts, points, radius):
+    """Callable that carries points as the bone within ``radius`` mm of ``points`` (k, 3) moves: a similarity.
+
+    parts : bone -> (n, 3) mm, where the bones are now
+    """
+    source = np.concatenate([rest.head.parts[name].vertices for name in BONES])
+    target = np.concatenate([parts[name] for name in BONES])
+    pick = cKDTree(points).query(source)[0] < radius
+    if pick.sum() < 12:
+        pick[:] = True
+    matrix, shift = similarity(source[pick], target[pick])
+    return lambda x: np.asarray(x) @ matrix.T + shift
 
 
 def bone_by_depth(reference: Head, parts, skin, turn, scale):

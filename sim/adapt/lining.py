@@ -8,12 +8,15 @@ what the seen skin does besides dies away as the smoothest displacement would (b
 import numpy as np
 from scipy.sparse import diags
 
-from .rest import Rest
+from .rest import MEET, Rest
 from .smooth_system import factorised
 from .thin_plate_spline import similarity
 
 #: Pull toward the organ's own motion, by edges behind the rim (the last for all beyond).
-PULL = {"eye_l": (0.02, 0.5, 3.0), "eye_r": (0.02, 0.5, 3.0), "mouth": (0.003, 0.05, 0.5, 3.0)}
+PULL = {"eye_l": (0.02, 0.5, 3.0), "eye_r": (0.02, 0.5, 3.0), "mouth": (0.01, 0.3, 3.0)}
+
+#: Lips whose distance differs from the reference's by less than this share of it are left as they are.
+ALIKE = 0.4
 
 
 def lined(rest: Rest, skin, organ: str, carried=None) -> np.ndarray:
@@ -46,4 +49,25 @@ def lined(rest: Rest, skin, organ: str, carried=None) -> np.ndarray:
     beside = skin[ring] - carried(start[ring])
     system = rest.energy[rows][:, rows] + diags(pull)
     out[rows] = carried(start[rows]) + factorised(system)(-(rest.energy[rows][:, ring] @ beside))
+    return out
+
+
+def lips_met(rest: Rest, skin, matrix) -> np.ndarray:
+    """Skin (n, 3) whose lips lie on each other as the reference's do: apart by as much, and no more.
+
+    matrix (3, 3) turns and scales the reference into the skin's place. Each pair keeps its middle, so the line on which
+    the lips meet stays.
+    """
+    upper, lower = rest.lip_pairs.T
+    start = rest.head.skin.vertices
+    gap = start[upper] - start[lower]
+    length = np.linalg.norm(gap, axis=1)
+    off = gap @ matrix.T - (skin[upper] - skin[lower])
+    # What a smooth warp does to them is right; only what is far from that is put right.
+    wrong = np.linalg.norm(off, axis=1) - ALIKE * length
+    share = np.clip(2 * (1 - length / MEET), 0, 1) * np.clip(wrong / np.maximum(ALIKE * length, 1e-9), 0, 1)
+    half = share[:, None] * off / 2
+    out = np.array(skin, dtype=float)
+    out[upper] += half
+    out[lower] -= half
     return out

@@ -20,6 +20,8 @@ from .thin_plate_spline import System, ThinPlateSpline
 from .untangle import sharp
 
 BONES = ("skull", "mandible")
+TEETH = ("teeth_upper", "teeth_lower")
+MEET = 4.0  # mm: lips that close at rest lie on each other
 COARSE = 14.0  # mm between centres of the warps, away from lids and lips
 #: Parts that carry what lies between the surfaces, and mm between the points of each that do.
 GAPS = (("skull", 18.0), ("mandible", 12.0), ("eye_l", 7.0), ("eye_r", 7.0), ("teeth_upper", 8.0), ("teeth_lower", 8.0))
@@ -42,9 +44,12 @@ class Rest:
     outer (t, 3) : triangles of the skin that are seen
     energy, link (n, n) : bending energy of a displacement of the skin, and its neighbours
     folds : pairs of neighbouring triangles that turn back on each other
+    lip_rim (k,) : vertices of the rim that are lips
+    lip_pairs (k, 2) : vertices of upper and lower lip that lie on each other, each the other's nearest
     organs : ``eye_l``, ``eye_r``, ``mouth``, ``nostrils`` -> rows of the inner skin that belong to them
     behind (n,) int : how many edges behind the rim a vertex of the inner skin lies, 0 for what is seen
     needs : bone -> (k,) mm of tissue that must remain over each of its vertices
+    from_teeth : bone -> (k,) mm from each of its vertices to the nearest tooth or gum
     """
 
     def __init__(self, reference: Head):
@@ -59,8 +64,13 @@ class Rest:
         a, b = edges(skin.faces).T
         self.link = coo_matrix((np.ones(2 * len(a)), (np.r_[a, b], np.r_[b, a])), shape=(n, n)).tocsr()
         self.folds = frozenset(map(tuple, sharp(skin.vertices, skin.triangles).tolist()))
+        lips = np.maximum(group(reference, "lip_upper"), group(reference, "lip_lower")) > 0.5
+        self.lip_rim = np.flatnonzero(self.rim & lips)
+        self.lip_pairs = self._lip_pairs()
         self.organs, self.behind = self._organs()
         self.needs = {name: self._needs(name) for name in BONES}
+        teeth = cKDTree(np.concatenate([reference.parts[name].vertices for name in TEETH]))
+        self.from_teeth = {name: teeth.query(reference.parts[name].vertices)[0] for name in BONES}
         seen = np.flatnonzero(~self.inner)
         even = seen[scattered(skin.vertices[seen], COARSE)]
         self._even, self._space = even, System(skin.vertices[even], 1.0)
@@ -90,6 +100,18 @@ class Rest:
     def lids(self, side: str) -> np.ndarray:
         """(n,) weights of both lids of the eye ``side``."""
         return np.maximum(group(self.head, f"lid_upper_{side}"), group(self.head, f"lid_lower_{side}"))
+
+    def _lip_pairs(self):
+        skin = self.head.skin.vertices
+        upper, lower = (
+            np.flatnonzero((self.rim | self.inner) & (group(self.head, f"lip_{x}") > 0.5)) for x in ("upper", "lower")
+        )
+        if len(upper) == 0 or len(lower) == 0:
+            return np.zeros((0, 2), dtype=int)
+        distance, there = cKDTree(skin[lower]).query(skin[upper])
+        back = cKDTree(skin[upper]).query(skin[lower])[1]
+        mutual = (back[there] == np.arange(len(upper))) & (distance > 0) & (distance < MEET)
+        return np.stack([upper[mutual], lower[there[mutual]]], axis=1)
 
     def _organs(self):
         rows = np.flatnonzero(self.inner)
