@@ -60,7 +60,7 @@ def build_head(reference: Head, scan: Mesh, landmarks: dict[str, np.ndarray]) ->
     check_arrangement(reference.landmark_positions(), given)
     fit = yield from portion(fit_skin(reference, target, given), 0.1, 0.7)
     refuse_poor(fit_report(reference, fit, given))
-    followed = yield from portion(follow(reference, fit.fitted.vertices, fit.closed, fit.unseen), 0.7, 0.95)
+    followed = yield from portion(follow(fit.reference, fit.fitted.vertices, fit.unseen), 0.7, 0.95)
     yield Progress(0.95, "Checking the anatomy")
     head = followed.head
     report = fit_report(reference, fit, given, head.skin.vertices)

@@ -19,7 +19,6 @@ from .closest import Surface
 from .lining import lined, lips_met
 from .mouth import mouth_similarity, with_teeth
 from .muscles import carried_muscles
-from .openings import lids_apart, sealed_lids
 from .rest import BONES, TEETH, Rest, rest_of
 from .skin_fit import group
 from .thin_plate_spline import similarity
@@ -36,14 +35,13 @@ class Followed:
     moved: float
 
 
-def follow(reference: Head, skin: np.ndarray, closed=(), unseen: np.ndarray | None = None) -> Work:
+def follow(reference: Head, skin: np.ndarray, unseen: np.ndarray | None = None) -> Work:
     """Work returning `Followed`: ``reference`` under another skin.
 
     Parameters
     ----------
     reference : the head that was warped
     skin : (n, 3) mm, its skin after the warp; the linings of mouth, lids and nostrils in it are not looked at
-    closed : sides (``l``, ``r``) of eyes that are shut
     unseen : (n,) bool, vertices that are to have the reference's own shape (None: none)
     """
     rest = rest_of(reference)
@@ -68,7 +66,6 @@ def follow(reference: Head, skin: np.ndarray, closed=(), unseen: np.ndarray | No
         new, turn = eyeballs.place_eye(old, around, start, skin, rest.lids(side), rest.inner, scale)
         eyes.append(new)
         carried[f"eye_{side}"] = eyeballs.eye_similarity(old, new, turn)
-        parts[f"eye_{side}"] = carried[f"eye_{side}"](reference.parts[f"eye_{side}"].vertices)
     for name in (*TEETH, "tongue"):
         parts[name] = mouth(reference.parts[name].vertices)
 
@@ -79,19 +76,17 @@ def follow(reference: Head, skin: np.ndarray, closed=(), unseen: np.ndarray | No
         final = lined(rest, final, organ, carried.get(organ))
     final = lips_met(rest, final, size)
     for eye, side in zip(eyes, "lr", strict=True):
-        if side in closed:
-            marks = reference.landmarks.on({"skin": skin})
-            final = lids_apart(reference, rest.rim, final, marks, size[:, 2], side)
-            final = sealed_lids(reference, rest.rim, final, eye, side)
-        final = eyeballs.lids_on_eye(rest, final, parts[f"eye_{side}"], eye, side)
+        final = eyeballs.lids_on_eye(rest, final, eye, side)
 
     yield Progress(0.45, "Untangle the skin")
     lining = np.maximum(group(reference, "lip_upper"), group(reference, "lip_lower")) > 0.3
     shut = rest.rim & lining  # where lips meet is seen, a fold behind them is not
-    for side in closed:  # closed lids lie too close for the reference's open ones to be restored
-        shut |= rest.lids(side) > 0.2
     final = restored(rest, final, unseen, scale)
     parts["skin"] = final = untangled(rest, final, seen & ~unseen, shut)
+    corners = reference.landmarks.on({"skin": final})
+    for eye, side in zip(eyes, "lr", strict=True):
+        part = f"eye_{side}"
+        parts[part] = eyeballs.eye_part(reference.parts[part].vertices, carried[part], eye, corners[f"en_{side}"])
 
     yield Progress(0.5, "Bone under the skin")
     surface = Surface(final, reference.skin.triangles)

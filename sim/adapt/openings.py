@@ -60,94 +60,6 @@ def lip_linings(reference: Head, gap: float = 3.0) -> np.ndarray:
     return pairs[between.min(axis=1) < gap]
 
 
-def lips_apart(reference: Head, skin, inner, matrix) -> np.ndarray:
-    """Skin vertices (n, 3) with the linings of the lips about as close to each other as on the reference: at least half
-    as far, and where they touch there, not much farther, or a slit would show the teeth.
-
-    matrix (3, 3) turns and scales the reference into the scan's place.
-    """
-    pairs = lip_linings(reference, 6.0)
-    if len(pairs) == 0:
-        return skin
-    out = np.array(skin)
-    rest = (reference.skin.vertices[pairs[:, 0]] - reference.skin.vertices[pairs[:, 1]]) @ matrix.T
-    length = np.linalg.norm(rest, axis=1)
-    way = rest / np.maximum(length, 1e-9)[:, None]
-    for _ in range(4):
-        apart = np.einsum("ij,ij->i", out[pairs[:, 0]] - out[pairs[:, 1]], way)
-        lack = np.maximum(0.5 * length - apart, 0)
-        slack = np.where(length < TOUCHING, np.maximum(apart - 1.2 * length, 0), 0)
-        push = (lack - slack)[:, None] * way / 2
-        for rows, sign in ((pairs[:, 0], 1.0), (pairs[:, 1], -1.0)):
-            count = np.bincount(rows, minlength=len(out))
-            for axis in range(3):
-                total = np.bincount(rows, sign * push[:, axis], minlength=len(out))
-                out[:, axis] += np.where(inner, total / np.maximum(count, 1), 0)
-    return out
-
-
-def lid_pairs(reference: Head, rim, side: str):
-    """Vertices of the upper lid's margin, and between which two of the lower one each comes to lie when closed.
-
-    Returns upper (k,), lower (k, 2), share (k,): the place is ``(1 - share) lower[0] + share lower[1]``.
-    """
-    v, marks = reference.skin.vertices, reference.landmark_positions()
-    upper, lower = (_rim_of(reference, rim, f"lid_{x}_{side}") for x in ("upper", "lower"))
-    if len(upper) == 0 or len(lower) < 2:
-        return np.zeros(0, int), np.zeros((0, 2), int), np.zeros(0)
-    axis = marks[f"ex_{side}"] - marks[f"en_{side}"]
-    length = np.linalg.norm(axis)
-
-    def along(rows):
-        return (v[rows] - marks[f"en_{side}"]) @ axis / length
-
-    lower = lower[np.argsort(along(lower), kind="stable")]
-    place, base = along(upper), along(lower)
-    after = np.clip(np.searchsorted(base, place), 1, len(lower) - 1)
-    step = base[after] - base[after - 1]
-    share = np.clip((place - base[after - 1]) / np.where(step > 1e-9, step, 1), 0, 1)
-    return upper, np.stack([lower[after - 1], lower[after]], axis=1), share
-
-
-def lids_apart(reference: Head, rim, skin, marks, up, side: str) -> np.ndarray:
-    """Skin vertices (n, 3) with the margins of closed lids parted where they passed each other.
-
-    marks : the fitted landmarks (name -> mm), for the way from the inner to the outer corner; up (3,)
-    """
-    out = np.array(skin)
-    frame = _eye_frame(marks[f"en_{side}"], marks[f"ex_{side}"], up)
-    upper, lower = (_rim_of(reference, rim, f"lid_{x}_{side}") for x in ("upper", "lower"))
-    for _ in range(6):
-        for rows, others, sign in ((upper, lower, 1.0), (lower, upper, -1.0)):
-            here, there = out[rows] @ frame.T, out[others] @ frame.T
-            order = np.argsort(there[:, 0], kind="stable")
-            level = np.interp(here[:, 0], there[order, 0], there[order, 1])
-            inside = (here[:, 0] > there[:, 0].min()) & (here[:, 0] < there[:, 0].max())
-            lack = np.where(inside, np.maximum(CREASE - sign * (here[:, 1] - level), 0), 0)
-            out[rows] += sign * lack[:, None] * frame[1]
-    return out
-
-
-def sealed_lids(reference: Head, rim, skin, eye, side: str) -> np.ndarray:
-    """Skin vertices (n, 3) with the backs of closed lids drawn up behind their margins, so that the lids meet over the
-    whole of a lid's thickness and not on one edge, which a smooth surface through them would round off."""
-    pair = edges(reference.skin.faces)
-    inner = np.asarray(reference.groups["inner"]) > 0.5
-    out = np.array(skin)
-    both = np.concatenate([pair, pair[:, ::-1]])
-    margin = np.concatenate([_rim_of(reference, rim, f"lid_{x}_{side}") for x in ("upper", "lower")])
-    both = both[np.isin(both[:, 0], margin) & inner[both[:, 1]]]
-    into = eye.centre - skin[both[:, 0]]
-    into /= np.maximum(np.linalg.norm(into, axis=1, keepdims=True), 1e-9)
-    behind = skin[both[:, 0]] + THICK * into
-    count = np.bincount(both[:, 1], minlength=len(skin))
-    rows = np.flatnonzero(count)
-    for axis in range(3):
-        total = np.bincount(both[:, 1], behind[:, axis], minlength=len(skin))
-        out[rows, axis] = total[rows] / count[rows]
-    return out
-
-
 def _eye_frame(en, ex, up):
     """Origin and rows (along, upward, forward) of an eye: from the inner to the outer corner; ``up`` roughly."""
     along = ex - en
@@ -164,8 +76,8 @@ def lid_margins(reference: Head, rim, given, matrix, closed=()):
     its one landmark (``ps``, ``pi``), wherever along the lid that was picked; a warp through the landmark alone would
     pinch the lid there.
 
-    matrix (3, 3) turns the reference into the scan's place; closed: sides of closed eyes, whose upper margin comes to
-    lie along the lower one. Returns vertices (k,), targets (k, 3).
+    matrix (3, 3) turns the reference into the scan's place; closed: sides of closed eyes, whose margins both pass midway
+    between the two. Returns vertices (k,), targets (k, 3).
     """
     v, rest = reference.skin.vertices, reference.landmark_positions()
     rows, targets = [], []
@@ -179,7 +91,6 @@ def lid_margins(reference: Head, rim, given, matrix, closed=()):
         start, length = rest[corners[0]], np.linalg.norm(rest[corners[1]] - rest[corners[0]])
         goal, reach = given[corners[0]], np.linalg.norm(given[corners[1]] - given[corners[0]])
         scale = reach / length
-        below = None
         for lid, mark in (("lower", f"pi_{side}"), ("upper", f"ps_{side}")):
             margin = _rim_of(reference, rim, f"lid_{lid}_{side}")
             if mark not in given or mark not in rest or len(margin) < 3:
@@ -187,7 +98,8 @@ def lid_margins(reference: Head, rim, given, matrix, closed=()):
             local = (v[margin] - start) @ old.T
             order = np.argsort(local[:, 0], kind="stable")
             margin, local = margin[order], local[order]
-            picked = (given[mark] - goal) @ new.T / scale
+            at = np.mean([given[f"{x}_{side}"] for x in ("pi", "ps")], axis=0) if side in closed else given[mark]
+            picked = (at - goal) @ new.T / scale
             here = [np.interp(picked[0], local[:, 0], local[:, k]) for k in (1, 2)]
             crest = local[np.abs(local[:, 1]).argmax(), 1]
             bulge = np.clip(local[:, 1] / crest, 0, 1)  # 0 at the corners, 1 where the margin is highest
@@ -195,10 +107,6 @@ def lid_margins(reference: Head, rim, given, matrix, closed=()):
             lift = ((picked[1] - here[0]) / share, np.clip((picked[2] - here[1]) / share, -4, 4))
             local[:, 1] += bulge * lift[0]
             local[:, 2] += bulge * lift[1]
-            if side in closed and lid == "upper" and below is not None:
-                for k, gap in ((1, CREASE / scale), (2, 0.0)):
-                    local[:, k] = np.interp(local[:, 0], below[:, 0], below[:, k]) + gap
-            below = local
             rows.append(margin)
             targets.append(goal + scale * local @ new)
     if not rows:

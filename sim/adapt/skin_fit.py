@@ -16,7 +16,8 @@ from .completion import complete_positions, sigma
 from .fine_fit import Anchors, Fitted, fine_fit
 from .openings import closed_eyes, lid_margins, rim_anchors, rims
 from .refine import Pairs, refine
-from .thin_plate_spline import ThinPlateSpline, WarpChain, similarity
+from .shut_eyes import with_shut_eyes
+from .thin_plate_spline import ThinPlateSpline, similarity
 
 EAR_MARKS = ("sa", "sba", "pra", "pa", "obs", "obi", "t")
 STIFF = tuple(f"{x}_{s}" for x in ("lid_upper", "lid_lower", "nostril") for s in ("l", "r"))
@@ -31,7 +32,7 @@ HOLD = 0.15  # weight in the last stage of a landmark picked to 1 mm, against 1 
 class SkinFit:
     """What `fit_skin` returns.
 
-    chain : the warps of space that were applied, reference -> scan
+    reference : the head that was fitted: the reference, its lids shut where the scan's are
     fitted : the skin after the last stage
     landmarks : name -> (3,) mm, given and completed targets
     outer (t, 3) : triangles a scanner can see; target : the scan as used (turned if it was inside out)
@@ -39,7 +40,7 @@ class SkinFit:
     unseen (n,) bool : vertices on and around ears that the scan does not show
     """
 
-    chain: WarpChain
+    reference: Head
     fitted: Fitted
     landmarks: dict[str, np.ndarray]
     outer: np.ndarray
@@ -68,6 +69,7 @@ def seen_ears(given) -> dict[str, bool]:
 
 def fit_skin(reference: Head, target: Surface, given: dict[str, np.ndarray]) -> Work:
     """Work returning the `SkinFit` of ``reference`` to the scan ``target`` with the landmarks ``given`` (mm)."""
+    reference, closed = as_scanned(reference, given)
     skin = reference.skin
     n = len(skin.vertices)
     triangles = skin.triangles
@@ -82,7 +84,6 @@ def fit_skin(reference: Head, target: Surface, given: dict[str, np.ndarray]) -> 
     give = np.where(known, [PICKED * sigma(name) for name in names], CARRIED)
     rim = rims(reference)
     turn, _ = similarity(marks, goal)
-    closed = closed_eyes(reference, landmarks, given)
     margin, margin_goal = lid_margins(reference, rim, given, turn, closed)
     give[np.isin(names, LID_MARKS) & known] += CARRIED * (len(margin) > 0)
     give = np.concatenate([give, np.full(len(margin), PICKED)])
@@ -90,7 +91,6 @@ def fit_skin(reference: Head, target: Surface, given: dict[str, np.ndarray]) -> 
     yield Progress(0.0, "Warp to the landmarks")
     aim = np.concatenate([goal, margin_goal])
     first = ThinPlateSpline.fit(np.concatenate([marks, skin.vertices[margin]]), aim, give)
-    chain = WarpChain((first,))
     moved = first.transform(skin.vertices)
     target = facing_out(target, moved, outer)
     # Landmarks that were not given are where the skin is now; data will move them.
@@ -108,7 +108,6 @@ def fit_skin(reference: Head, target: Surface, given: dict[str, np.ndarray]) -> 
         except StopIteration as stop:
             warps = stop.value
     for warp in warps:
-        chain = chain.then(warp)
         moved = warp.transform(moved)
 
     free, stiffness = freedom(reference, given, rim, unseen)
@@ -129,7 +128,15 @@ def fit_skin(reference: Head, target: Surface, given: dict[str, np.ndarray]) -> 
             yield Progress(0.4 + 0.6 * next(work), "Reach the scan")
         except StopIteration as stop:
             fitted = stop.value
-    return SkinFit(chain, fitted, landmarks, outer, target, closed, unseen)
+    return SkinFit(reference, fitted, landmarks, outer, target, closed, unseen)
+
+
+def as_scanned(reference: Head, given) -> tuple[Head, tuple[str, ...]]:
+    """The reference with the lids shut of the eyes that the landmarks ``given`` show shut, and the sides of those."""
+    rest = reference.landmark_positions()
+    names = {name: rest[name] for name in SKIN if name in rest}
+    closed = tuple(closed_eyes(reference, complete_positions(names, given), given))
+    return (with_shut_eyes(reference, closed) if closed else reference), closed
 
 
 def feature_triangles(reference: Head, names) -> np.ndarray:

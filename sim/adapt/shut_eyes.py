@@ -1,0 +1,20 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The reference with its lids shut: what a scan of closed eyes is fitted with, so that lids meet as lids do."""
+
+from functools import lru_cache
+
+import numpy as np
+
+from ..anatomy.head import Head
+from ..mesh import edges
+
+#: Share of the lids' way at which their margins just meet.
+MEET = 0.97
+
+
+@lru_cache(maxsize=4)
+def with_shut_eyes(reference: Head, sides: tuple[str, ...]) -> Head:
+    """``reference`` with the lids of the ``sides`` (``l``, ``r``) turned shut over the eyeballs, by no muscle."""
+    from ..acting.plain_posing import plainly_posed
+
+    return plainly_posed(reference, blink=tuple(MEET * (side in sides) for side in "lr"))
