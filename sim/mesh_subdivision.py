@@ -5,6 +5,8 @@ Catmull and Clark 1978 with the cubic B-spline rule along boundaries; limit posi
 1993, section 3.
 """
 
+from functools import lru_cache
+
 import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix, diags, vstack
 
@@ -41,6 +43,37 @@ def limit(quads: np.ndarray, vertex_count: int) -> csr_matrix:
     own = np.where(inner, valence**2 * weight, np.where(curve, 4 / 6, 1))
     own[valence == 0] = 1
     return (diags(own) + diags(weight) @ (4 * neighbours + diagonal) + diags(curve / 6) @ along).tocsr()
+
+
+def smoother(faces: np.ndarray, vertex_count: int, levels: int = 1) -> tuple[csr_matrix, np.ndarray]:
+    """The operator (k, vertex_count) onto points of the limit surface, the coarse vertices' own first, and its quads.
+
+    Kept for the faces last asked for.
+    """
+    faces = np.ascontiguousarray(faces, dtype=np.int32)
+    return _smoother(faces.tobytes(), faces.shape, vertex_count, levels)
+
+
+def drawn(faces: np.ndarray, vertices: np.ndarray) -> np.ndarray:
+    """(n, 3) where the vertices of a cage come to lie on the surface that is drawn of it."""
+    return smoother(faces, len(vertices))[0][: len(vertices)] @ vertices
+
+
+def undrawn(faces: np.ndarray, vertices: np.ndarray, points: np.ndarray, rounds: int = 4) -> np.ndarray:
+    """(n, 3) a cage near ``vertices`` (n, 3) whose drawn surface passes through ``points`` (n, 3), one for each vertex.
+
+    Each round moves the cage by what is left; a few rounds leave alone what is rougher than the mesh can show.
+    """
+    cage = np.array(vertices, dtype=float)
+    for _ in range(rounds):
+        cage += points - drawn(faces, cage)
+    return cage
+
+
+@lru_cache(maxsize=6)
+def _smoother(faces: bytes, shape, count: int, levels: int):
+    operator, quads, _ = subdivision(np.frombuffer(faces, dtype=np.int32).reshape(shape), count, levels)
+    return (limit(quads, operator.shape[0]) @ operator).tocsr(), quads
 
 
 def _step(faces, n):

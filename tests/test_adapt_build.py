@@ -197,7 +197,7 @@ def test_the_same_scan_moved_gives_the_same_head_moved(reference, coarse):
     there, _ = _fitted(
         reference, scan.moved(scan.vertices @ turn.T + shift), {n: turn @ p + shift for n, p in marks.items()}
     )
-    one, other = (finish(follow(f.reference, f.fitted.vertices, f.unseen)).head for f in (here, there))
+    one, other = (finish(follow(f.reference, f.cage, f.unseen)).head for f in (here, there))
     for part in one.parts:
         off = np.linalg.norm((other.parts[part].vertices - shift) @ turn - one.parts[part].vertices, axis=1)
         assert off.max() < 0.1, part

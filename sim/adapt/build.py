@@ -9,6 +9,7 @@ from ..anatomy.head import Head
 from ..anatomy.landmark_names import SKIN
 from ..errors import InputError
 from ..mesh import Mesh
+from ..mesh_subdivision import drawn
 from ..progress import Progress, Work, portion
 from .bone import depth_under
 from .closest import Surface
@@ -60,10 +61,10 @@ def build_head(reference: Head, scan: Mesh, landmarks: dict[str, np.ndarray]) ->
     check_arrangement(reference.landmark_positions(), given)
     fit = yield from portion(fit_skin(reference, target, given), 0.1, 0.7)
     refuse_poor(fit_report(reference, fit, given))
-    followed = yield from portion(follow(fit.reference, fit.fitted.vertices, fit.unseen), 0.7, 0.95)
+    followed = yield from portion(follow(fit.reference, fit.cage, fit.unseen), 0.7, 0.95)
     yield Progress(0.95, "Checking the anatomy")
     head = followed.head
-    report = fit_report(reference, fit, given, head.skin.vertices)
+    report = fit_report(reference, fit, given, drawn(head.skin.faces, head.skin.vertices))
     anatomy = anatomy_report(head)
     missing = tuple(n for n in SKIN if n not in given)
     attributes = {
@@ -76,7 +77,7 @@ def build_head(reference: Head, scan: Mesh, landmarks: dict[str, np.ndarray]) ->
 def fit_report(reference: Head, fit: SkinFit, given, vertices=None) -> dict:
     """Distances from the skin to the scan in the face, mm, where there is data; see `BuildResult`.
 
-    ``vertices`` (n, 3) mm of the skin, if other than those of ``fit``.
+    ``vertices`` (n, 3) mm of the skin as drawn, if other than those of ``fit``.
     """
     skin = reference.skin
     face = (group(reference, "face") > 0.5) & (group(reference, "inner") <= 0.5)
@@ -119,7 +120,7 @@ def refuse_poor(report: dict) -> None:
 
 def anatomy_report(head: Head) -> dict:
     """Count of muscles, bone vertices outside the skin, and the median tissue over the bone that faces the skin, mm."""
-    surface = Surface(head.skin.vertices, head.skin.triangles)
+    surface = Surface(drawn(head.skin.faces, head.skin.vertices), head.skin.triangles)
     outside, thickness = 0, []
     for name in BONES:
         depth, _ = depth_under(head.parts[name].vertices, surface, REACH)

@@ -14,7 +14,8 @@ if TYPE_CHECKING:
     from .rest import Rest
 
 SMALLEST, LARGEST = 9.5, 13.0  # mm: from a child of one year to a large adult eye
-CORNERS, FADE = (0.08, 0.98), 0.1  # along an eye from its inner corner: where lids lie on the ball; fading in and out
+CORNERS, FADE = (0.06, 1.12), 0.12  # along an eye from its inner corner: where lids lie on the ball; fading in and out
+BESIDE = (0.7, 0.35)  # how much of that holds for the seen lid one and two edges beside the rim
 OUTSIDE = 0.8  # mm of lid between eyeball and seen skin, at least, where the reference has as much
 
 
@@ -99,8 +100,18 @@ def lids_on_eye(rest: "Rest", skin, eye: Eye, side: str) -> np.ndarray:
         return skin
     grow = eye.radius / old.radius
     now = height_over(skin[rows], eye, profile_of(eye))
-    keep = (rest.inner | rest.rim)[rows] * _between_corners(head, start[rows], side)
-    least = np.where(rest.inner[rows], np.minimum(height[rows], 0.1), np.clip(0.6 * height[rows], 0.05, OUTSIDE)) * grow
+    near = (rest.inner | rest.rim).astype(float)
+    for share in BESIDE:
+        near = np.maximum(near, share * (rest.link @ near > 0.99 * near[near > 0].min()))
+    keep = near[rows] * _between_corners(head, start[rows], side)
+    least = (
+        np.where(
+            rest.inner[rows],
+            np.minimum(height[rows], 0.1),
+            np.clip(0.6 * height[rows], np.minimum(height[rows], 0.05), OUTSIDE),
+        )
+        * grow
+    )
     want = np.maximum(now + keep * (grow * height[rows] - now), least)
     out = np.array(skin)
     away = out[rows] - eye.centre

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import csr_matrix, diags, vstack
 
-from ..mesh import vertex_normals
+from ..mesh import edges, vertex_normals
 from .closest import Surface
 from .smooth_system import laplacian, solve_displacement
 
@@ -30,6 +30,7 @@ SCHEDULE = (
 ALONG = 0.02  # weight of a pull along the surface against one across it
 AGREE = 0.6  # cosine between the normals of skin and scan
 WHOLE = 150.0  # mm²: a piece of data smaller than this is trusted in proportion
+FINEST = 20.0  # most by which fine parts of the mesh are stiffened
 STRETCH = 0.002  # weight of first differences, which keeps the mesh from sliding where bending is free
 
 
@@ -82,6 +83,7 @@ def fine_fit(vertices, faces, triangles, free, target: Surface, anchors: Anchors
     n = len(base)
     stiffness = np.ones(n) if stiffness is None else np.array(stiffness, dtype=float)
     bend = laplacian(base, faces)
+    stiffness = stiffness * fineness(base, faces)
     look = sample_rows(faces, free, n)
     displacement = np.zeros((n, 3))
     outer = triangles[free[triangles].all(axis=1)]
@@ -124,6 +126,20 @@ def fine_fit(vertices, faces, triangles, free, target: Surface, anchors: Anchors
     trust[~free] = 0
     gap = np.einsum("ij,ij->i", vertices - found.points, found.normals)
     return Fitted(vertices, np.clip(trust, 0, 1), np.where(free & (trust > 0), gap, np.nan))
+
+
+def fineness(vertices, faces) -> np.ndarray:
+    """(n,) factor on the stiffness: the same bend costs as much in a fine mesh as in a coarse one.
+
+    A Laplacian without units sees a bend over short edges as small; small features would be the first to fold.
+    """
+    a, b = edges(faces).T
+    length = np.linalg.norm(vertices[a] - vertices[b], axis=1)
+    n = len(vertices)
+    count = np.bincount(a, minlength=n) + np.bincount(b, minlength=n)
+    mean = (np.bincount(a, length, n) + np.bincount(b, length, n)) / np.maximum(count, 1)
+    usual = np.median(mean[count > 0])
+    return np.clip((usual / np.maximum(mean, 1e-6)) ** 2, 1.0, FINEST)
 
 
 def stretch(bend, stiffness):

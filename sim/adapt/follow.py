@@ -13,6 +13,7 @@ from scipy.spatial import cKDTree
 
 from ..anatomy.head import Head
 from ..anatomy.tissue_depth import tissue_vectors
+from ..mesh_subdivision import drawn
 from ..progress import Progress, Work
 from . import bone, eyeballs
 from .closest import Surface
@@ -89,7 +90,7 @@ def follow(reference: Head, skin: np.ndarray, unseen: np.ndarray | None = None) 
         parts[part] = eyeballs.eye_part(reference.parts[part].vertices, carried[part], eye, corners[f"en_{side}"])
 
     yield Progress(0.5, "Bone under the skin")
-    surface = Surface(final, reference.skin.triangles)
+    surface = Surface(drawn(reference.skin.faces, final), reference.skin.triangles)
     moved = 0.0
     for name in BONES:
         before = parts[name]

@@ -6,7 +6,7 @@ skin around them smoothly, hold on to the landmarks, and the lips, or closed lid
 """
 
 import numpy as np
-from scipy.sparse import coo_matrix, csr_matrix
+from scipy.sparse import coo_matrix
 
 from ..anatomy.head import Head
 from ..mesh import edges
@@ -14,9 +14,7 @@ from .fine_fit import Anchors
 
 TOGETHER = 3.0  # weight of a pair of rim points, against 1 for a point of data
 CLOSED = 0.3  # opening of the lids against the reference's below which an eye counts as closed
-TOUCHING = 3.0  # mm: linings of the lips this close on the reference belong together
-THICK = 1.1  # mm from the margin of a closed lid to its back
-CREASE = 0.15  # mm between the margins of closed lids
+SHUT = 1.2  # mm: margins of lids this close on the reference lie on each other
 
 
 def rims(reference: Head) -> np.ndarray:
@@ -130,43 +128,28 @@ def closed_eyes(reference: Head, landmarks, given) -> list[str]:
     return out
 
 
-def rim_anchors(reference: Head, rim, matrix, closed) -> Anchors:
+def rim_anchors(reference: Head, rim, matrix) -> Anchors:
     """Pairs of rim points as rows of the last stage's system; targets are positions, so rows are differences.
 
-    matrix (3, 3) turns and scales the reference's offsets into the scan's place; closed: sides of closed eyes.
+    matrix (3, 3) turns and scales the reference's offsets into the scan's place.
     """
     v = reference.skin.vertices
     n = len(v)
-    lips = lip_pairs(reference, rim)
-    data, row, column, target = [], [], [], []
-    count = 0
+    pairs = [lip_pairs(reference, rim), lip_linings(reference)]
+    pairs += [touching_lids(reference, rim, side) for side in ("l", "r")]
+    upper, lower = np.unique(np.concatenate(pairs), axis=0).T
+    k = len(upper)
+    place = (np.tile(np.arange(k), 2), np.concatenate([upper, lower]))
+    sampling = coo_matrix((np.repeat([1.0, -1.0], k), place), shape=(k, n)).tocsr()
+    return Anchors(sampling, (v[upper] - v[lower]) @ matrix.T, np.full(k, TOGETHER))
 
-    def add(plus, minus, share, offset):
-        nonlocal count
-        k = len(plus)
-        rows = count + np.arange(k)
-        for at, value in ((plus, np.ones(k)), (minus[:, 0], share - 1), (minus[:, 1], -share)):
-            data.append(value)
-            row.append(rows)
-            column.append(at)
-        target.append(offset)
-        count += k
 
-    inside = lip_linings(reference)
-    lips = np.unique(np.concatenate([lips, inside]), axis=0)
-    if len(lips):
-        add(
-            lips[:, 0],
-            np.repeat(lips[:, 1:], 2, axis=1),
-            np.zeros(len(lips)),
-            (v[lips[:, 0]] - v[lips[:, 1]]) @ matrix.T,
-        )
-    up = matrix[:, 2] / np.linalg.norm(matrix[:, 2])
-    for side in closed:
-        upper, lower, share = lid_pairs(reference, rim, side)
-        add(upper, lower, share, np.tile(CREASE * up, (len(upper), 1)))
-    if not count:
-        return Anchors(csr_matrix((0, n)), np.zeros((0, 3)), np.zeros(0))
-    place = (np.concatenate(row), np.concatenate(column))
-    sampling = coo_matrix((np.concatenate(data), place), shape=(count, n)).tocsr()
-    return Anchors(sampling, np.concatenate(target), np.full(count, TOGETHER))
+def touching_lids(reference: Head, rim, side: str) -> np.ndarray:
+    """(k, 2) vertices of the upper and lower lid's rim that lie on each other; none where the eye is open."""
+    v = reference.skin.vertices
+    upper, lower = (_rim_of(reference, rim, f"lid_{x}_{side}") for x in ("upper", "lower"))
+    if len(upper) == 0 or len(lower) == 0:
+        return np.zeros((0, 2), dtype=int)
+    gap = np.linalg.norm(v[upper][:, None] - v[lower][None], axis=2)
+    pairs = np.stack([upper, lower[gap.argmin(axis=1)]], axis=1)
+    return pairs[(gap.min(axis=1) < SHUT) & (pairs[:, 0] != pairs[:, 1])]

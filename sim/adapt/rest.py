@@ -10,6 +10,7 @@ from scipy.spatial import cKDTree
 
 from ..anatomy.head import Head
 from ..mesh import edges
+from ..mesh_subdivision import drawn
 from . import bone
 from .closest import Surface
 from .openings import rims
@@ -63,7 +64,7 @@ class Rest:
         self.energy = (bend.T @ bend).tocsr()
         a, b = edges(skin.faces).T
         self.link = coo_matrix((np.ones(2 * len(a)), (np.r_[a, b], np.r_[b, a])), shape=(n, n)).tocsr()
-        self.folds = frozenset(map(tuple, sharp(skin.vertices, skin.triangles).tolist()))
+        self.folds = frozenset(map(tuple, sharp(drawn(skin.faces, skin.vertices), skin.triangles).tolist()))
         lips = np.maximum(group(reference, "lip_upper"), group(reference, "lip_lower")) > 0.5
         self.lip_rim = np.flatnonzero(self.rim & lips)
         self.lip_pairs = self._lip_pairs()

@@ -3,10 +3,7 @@
 
 from functools import lru_cache
 
-import numpy as np
-
 from ..anatomy.head import Head
-from ..mesh import edges
 
 #: Share of the lids' way at which their margins just meet.
 MEET = 0.97

@@ -10,6 +10,7 @@ from scipy.spatial import cKDTree
 from ..anatomy.head import Head, SurfacePoints
 from ..anatomy.landmark_names import SKIN
 from ..mesh import vertex_normals
+from ..mesh_subdivision import drawn, undrawn
 from ..progress import Progress, Work
 from .closest import Surface
 from .completion import complete_positions, sigma
@@ -33,7 +34,8 @@ class SkinFit:
     """What `fit_skin` returns.
 
     reference : the head that was fitted: the reference, its lids shut where the scan's are
-    fitted : the skin after the last stage
+    fitted : the skin after the last stage, as it is drawn
+    cage (n, 3) mm : the skin that is drawn like that
     landmarks : name -> (3,) mm, given and completed targets
     outer (t, 3) : triangles a scanner can see; target : the scan as used (turned if it was inside out)
     closed : sides ("l", "r") of closed eyes
@@ -42,6 +44,7 @@ class SkinFit:
 
     reference: Head
     fitted: Fitted
+    cage: np.ndarray
     landmarks: dict[str, np.ndarray]
     outer: np.ndarray
     target: Surface
@@ -68,8 +71,12 @@ def seen_ears(given) -> dict[str, bool]:
 
 
 def fit_skin(reference: Head, target: Surface, given: dict[str, np.ndarray]) -> Work:
-    """Work returning the `SkinFit` of ``reference`` to the scan ``target`` with the landmarks ``given`` (mm)."""
-    reference, closed = as_scanned(reference, given)
+    """Work returning the `SkinFit` of ``reference`` to the scan ``target`` with the landmarks ``given`` (mm).
+
+    It is the surface drawn of the skin, the limit of its subdivision, that is laid on the scan.
+    """
+    whole, closed = as_scanned(reference, given)
+    reference = whole.with_vertices({"skin": drawn(whole.skin.faces, whole.skin.vertices)})
     skin = reference.skin
     n = len(skin.vertices)
     triangles = skin.triangles
@@ -114,7 +121,7 @@ def fit_skin(reference: Head, target: Surface, given: dict[str, np.ndarray]) -> 
     weight = np.where(known, [HOLD / sigma(name) ** 2 for name in names], 0.0)
     weight[np.isin(names, LID_MARKS)] *= 0.1 if len(margin) else 1.0
     matrix, _ = similarity(skin.vertices, moved)
-    together = rim_anchors(reference, rim, matrix, closed)
+    together = rim_anchors(reference, rim, matrix)
     on_margin = csr_matrix((np.ones(len(margin)), (np.arange(len(margin)), margin)), shape=(len(margin), n))
     anchors = Anchors(
         vstack([rows, on_margin, together.sampling]).tocsr(),
@@ -128,7 +135,8 @@ def fit_skin(reference: Head, target: Surface, given: dict[str, np.ndarray]) -> 
             yield Progress(0.4 + 0.6 * next(work), "Reach the scan")
         except StopIteration as stop:
             fitted = stop.value
-    return SkinFit(reference, fitted, landmarks, outer, target, closed, unseen)
+    moved = whole.skin.vertices + fitted.vertices - skin.vertices
+    return SkinFit(whole, fitted, undrawn(skin.faces, moved, fitted.vertices), landmarks, outer, target, closed, unseen)
 
 
 def as_scanned(reference: Head, given) -> tuple[Head, tuple[str, ...]]:

@@ -11,6 +11,7 @@ import numpy as np
 from scipy.sparse.csgraph import connected_components
 
 from ..mesh_piercing import self_piercings
+from ..mesh_subdivision import drawn
 from .smooth_system import factorised
 from .thin_plate_spline import similarity
 
@@ -47,7 +48,7 @@ def tangled(vertices, triangles, allowed=frozenset(), among=None):
 
 
 def untangled(rest: "Rest", vertices, visible, hold=None, rounds: int = 6):
-    """The vertices (n, 3) with tangles smoothed away.
+    """The vertices (n, 3) with tangles of the drawn surface smoothed away.
 
     Parameters
     ----------
@@ -60,7 +61,7 @@ def untangled(rest: "Rest", vertices, visible, hold=None, rounds: int = 6):
     patch = np.zeros(len(out), dtype=bool)
     best, fewest, among = out, None, None
     for turn in range(rounds):
-        wrong = tangled(out, triangles, rest.folds, among)
+        wrong = tangled(drawn(rest.head.skin.faces, out), triangles, rest.folds, among)
         if hold is not None:
             wrong &= ~hold
         if fewest is None or wrong.sum() < fewest:

@@ -1,14 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What cuts what: pairs of triangles of one part, or of two, of which one pierces the other."""
 
-from functools import lru_cache
-
-import numpy as np
-
 from ..anatomy.head import Head
 from ..mesh import Mesh
 from ..mesh_piercing import piercings, self_piercings
-from ..mesh_subdivision import limit, subdivision
+from ..mesh_subdivision import smoother
 
 #: Parts of which none may cut another. Teeth stand in bone and gums lie on it, so those pairs are no fault.
 APART = (
@@ -38,7 +34,7 @@ def cuts(head: Head, pairs=APART) -> dict[tuple[str, str], int]:
 
 def smooth_skin(skin: Mesh, levels: int = LEVELS) -> Mesh:
     """The skin as it is drawn: subdivided, its vertices on the limit surface, the cage's own first."""
-    operator, quads = _smoother(skin.faces.tobytes(), skin.faces.shape, len(skin.vertices), levels)
+    operator, quads = smoother(skin.faces, len(skin.vertices), levels)
     return Mesh(operator @ skin.vertices, quads)
 
 
@@ -51,10 +47,3 @@ def smooth_cuts(head: Head, smooth: Mesh) -> dict[str, int]:
 
 def _between(one: Mesh, other: Mesh):
     return piercings(one.vertices, one.triangles, other.vertices, other.triangles)
-
-
-@lru_cache(maxsize=4)
-def _smoother(faces: bytes, shape, count: int, levels: int):
-    table = np.frombuffer(faces, dtype=np.int32).reshape(shape)
-    operator, quads, _ = subdivision(table, count, levels)
-    return (limit(quads, operator.shape[0]) @ operator).tocsr(), quads

@@ -16,7 +16,7 @@ from ..anatomy.head import Head, moved_muscles_and_jaw
 from ..anatomy.storage import load_head, write_atomically
 from ..errors import InputError
 from ..mesh import Mesh, vertex_normals
-from ..mesh_subdivision import limit, subdivision
+from ..mesh_subdivision import smoother
 from ..progress import Progress, Work, portion
 from .individual import individual
 from .noise import Noise
@@ -41,7 +41,7 @@ class Sample:
     landmarks : the 60, exact, on the truth
     missing : landmarks left out of the file (none: those the scanner did not see lie in mid-air)
     not_in_scan : landmarks more than `SEEN` mm from any measured point
-    truth : the individual's head; its skin vertices lie on ``surface``
+    truth : the individual's head; ``surface`` is drawn of its skin
     surface : the smooth truth, quads of about a millimetre, with colours
     """
 
@@ -70,10 +70,11 @@ def make_sample(
     reference = reference or load_head()
     person = individual(reference, rng)
     yield Progress(0.1, "Smoothing the skin")
-    person, surface, inner, ears = _smooth(person, reference, levels, rng)
+    surface, inner, ears = _smooth(person, reference, levels, rng)
     complexion = Complexion.draw(rng)
     yield Progress(0.3, "Painting the skin")
-    landmarks = _on_surface(person.landmark_positions(), surface)
+    at = person.landmarks.on({"skin": surface.vertices[: len(person.skin.vertices)]})
+    landmarks = _on_surface(at, surface)
     paint = paint_skin(surface.vertices, landmarks, inner, ears, complexion, rng)
     paint = _dressed(paint, surface.vertices, landmarks, rng)
     surface = replace(surface, colour=paint.colour)
@@ -117,15 +118,10 @@ def write_sample(sample: Sample, directory) -> list[Path]:
 
 
 def _smooth(person, reference, levels, rng):
-    """The head with its skin on a smooth surface, that surface, and the groups inner and ears on it."""
+    """The surface drawn of the head's skin, a little uneven, and the groups inner and ears on it."""
     faces, n = person.skin.faces, len(person.skin.vertices)
-    operator, quads, _ = subdivision(faces, n, levels)
-    operator = (limit(quads, operator.shape[0]) @ operator).tocsr()
-    # the limit surface shrinks from its cage: push the cage out until its limit passes the person's own vertices
-    cage = person.skin.vertices.copy()
-    for _ in range(2):
-        cage += 0.8 * (person.skin.vertices - operator[:n] @ cage)
-    points = operator @ cage
+    operator, quads = smoother(faces, n, levels)
+    points = operator @ person.skin.vertices
     groups = reference.groups
     inner, ears = (
         np.clip(operator @ g.astype(float), 0, 1) for g in (groups["inner"], groups["ear_l"] + groups["ear_r"])
@@ -135,8 +131,7 @@ def _smooth(person, reference, levels, rng):
     rest = operator @ reference.skin.vertices  # the unevenness of skin belongs to the skin, not to space
     relief = (0.07 * Noise(rng, 7.0)(rest) + 0.02 * Noise(rng, 2.5)(rest)) * (1 - inner)
     points = points + relief[:, None] * normals
-    truth = replace(person, parts=person.parts | {"skin": person.skin.moved(points[:n])})
-    return truth, Mesh(points, quads), inner, ears
+    return Mesh(points, quads), inner, ears
 
 
 def _on_surface(positions, surface):
