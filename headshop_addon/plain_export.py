@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A head as plain files for programs that have no Blender: meshes as PLY, the rest as JSON, shapes as ``.npz``.
 
-All in mm, Z up, face toward -Y, in the scan's own place; the skin is the cage without subdivision, in triangles.
+All in mm, Z up, face toward -Y, in the scan's own place. The skin is in triangles between the cage's vertices, each of
+them where it comes to lie on the surface that is drawn, the limit of subdivision; so are landmarks and shapes.
 """
 
 import io
@@ -14,6 +15,7 @@ from ..sim.adapt.landmarks import write_landmarks
 from ..sim.anatomy.head import Head
 from ..sim.anatomy.storage import write_atomically
 from ..sim.mesh import Mesh
+from ..sim.mesh_subdivision import drawn
 from ..sim.scan.ply import write_ply
 from . import bridge, heads, shape_keys
 from .plain_files import muscles_document, write_json
@@ -27,7 +29,7 @@ def write_plain(skin: bpy.types.Object, folder) -> None:
     InputError : not a whole head (`heads.read_head`).
     """
     folder = Path(folder)
-    head = heads.read_head(skin)
+    head = as_drawn(heads.read_head(skin))
     report = heads.read_report(skin)
     for part in ("skin", "skull", "mandible"):
         mesh = head.parts[part]
@@ -43,11 +45,19 @@ def write_plain(skin: bpy.types.Object, folder) -> None:
         write_atomically(folder / "shapes.npz", stream.getvalue())
 
 
+def as_drawn(head: Head) -> Head:
+    """The head with its skin's vertices on the surface drawn of it, where a scan was fitted."""
+    return head.with_vertices({"skin": drawn(head.skin.faces, head.skin.vertices)})
+
+
 def shapes_arrays(skin: bpy.types.Object, head: Head) -> dict[str, np.ndarray]:
-    """``names`` (k,), ``basis`` (n, 3), ``deltas`` (k, n, 3) in mm and ``triangles`` (m, 3) of the baked shapes."""
+    """``names`` (k,), ``basis`` (n, 3), ``deltas`` (k, n, 3) in mm and ``triangles`` (m, 3) of the baked shapes.
+
+    ``head`` has its skin as drawn (`as_drawn`).
+    """
     names = shape_keys.baked_names(skin)
-    basis = head.skin.vertices
-    deltas = [bridge.read_positions(skin, name) - basis for name in names]
+    basis, faces = head.skin.vertices, head.skin.faces
+    deltas = [drawn(faces, bridge.read_positions(skin, name)) - basis for name in names]
     return {
         "names": np.array(names, dtype=str),
         "basis": basis,

@@ -19,7 +19,7 @@ from headshop.sim.anatomy.landmark_names import mirrored
 from headshop.sim.errors import InputError
 from headshop.sim.mesh import Mesh, edges
 from headshop.sim.mesh_piercing import self_piercings
-from headshop.sim.mesh_subdivision import subdivision
+from headshop.sim.mesh_subdivision import drawn, subdivision
 from headshop.sim.progress import Progress, finish
 from headshop.sim.scan.clean import clean_scan
 from headshop.sim.scan.ply import read_ply
@@ -105,11 +105,13 @@ def test_no_triangle_turned_over(reference, built, subject):
     triangles = reference.skin.triangles
     inner = np.asarray(reference.groups["inner"]) > 0.5
     outside = triangles[~inner[triangles].any(axis=1)]
-    assert not folded(subject[2], built[0].head.skin.vertices, outside, -0.2).any()
+    faces = reference.skin.faces
+    assert not folded(drawn(faces, subject[2]), drawn(faces, built[0].head.skin.vertices), outside, -0.2).any()
 
 
 def test_the_skin_pierces_itself_nowhere(reference, built):
-    assert len(self_piercings(built[0].head.skin.vertices, reference.skin.triangles)) == 0
+    skin = built[0].head.skin
+    assert len(self_piercings(drawn(skin.faces, skin.vertices), skin.triangles)) == 0
 
 
 def test_tangles_are_found_and_undone(reference):

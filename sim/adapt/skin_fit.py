@@ -135,8 +135,10 @@ def fit_skin(reference: Head, target: Surface, given: dict[str, np.ndarray]) -> 
             yield Progress(0.4 + 0.6 * next(work), "Reach the scan")
         except StopIteration as stop:
             fitted = stop.value
-    moved = whole.skin.vertices + fitted.vertices - skin.vertices
-    return SkinFit(whole, fitted, undrawn(skin.faces, moved, fitted.vertices), landmarks, outer, target, closed, unseen)
+    matrix, _ = similarity(skin.vertices, fitted.vertices)
+    start = fitted.vertices + (whole.skin.vertices - skin.vertices) @ matrix.T
+    cage = undrawn(skin.faces, start, fitted.vertices)
+    return SkinFit(whole, fitted, cage, landmarks, outer, target, closed, unseen)
 
 
 def as_scanned(reference: Head, given) -> tuple[Head, tuple[str, ...]]:

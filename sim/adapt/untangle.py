@@ -48,7 +48,7 @@ def tangled(vertices, triangles, allowed=frozenset(), among=None):
 
 
 def untangled(rest: "Rest", vertices, visible, hold=None, rounds: int = 6):
-    """The vertices (n, 3) with tangles of the drawn surface smoothed away.
+    """The vertices (n, 3) with tangles smoothed away, of the surface drawn and of its cage.
 
     Parameters
     ----------
@@ -62,6 +62,7 @@ def untangled(rest: "Rest", vertices, visible, hold=None, rounds: int = 6):
     best, fewest, among = out, None, None
     for turn in range(rounds):
         wrong = tangled(drawn(rest.head.skin.faces, out), triangles, rest.folds, among)
+        wrong[triangles[self_piercings(out, triangles, among).ravel()].ravel()] = True
         if hold is not None:
             wrong &= ~hold
         if fewest is None or wrong.sum() < fewest:

@@ -1,10 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What cuts what: pairs of triangles of one part, or of two, of which one pierces the other."""
 
+from dataclasses import replace
+
+import numpy as np
+
 from ..anatomy.head import Head
 from ..mesh import Mesh
 from ..mesh_piercing import piercings, self_piercings
 from ..mesh_subdivision import smoother
+from .mouth import crowns
 
 #: Parts of which none may cut another. Teeth stand in bone and gums lie on it, so those pairs are no fault.
 APART = (
@@ -28,7 +33,10 @@ def self_cuts(mesh: Mesh) -> int:
 
 def cuts(head: Head, pairs=APART) -> dict[tuple[str, str], int]:
     """Pair of parts -> pairs of triangles that pierce each other, where there are any."""
-    found = {(a, b): len(_between(head.parts[a], head.parts[b])) for a, b in pairs}
+    found = {
+        (a, b): len(_between(head.parts[a], _in_mouth(b, head.parts[b]) if a == "skin" else head.parts[b]))
+        for a, b in pairs
+    }
     return {pair: count for pair, count in found.items() if count}
 
 
@@ -40,10 +48,20 @@ def smooth_skin(skin: Mesh, levels: int = LEVELS) -> Mesh:
 
 def smooth_cuts(head: Head, smooth: Mesh) -> dict[str, int]:
     """Part -> pairs of its triangles and of the smooth skin's that pierce each other; ``skin`` for the skin itself."""
-    found = {part: len(_between(smooth, head.parts[part])) for skin, part in APART if skin == "skin"}
+    found = {part: len(_between(smooth, _in_mouth(part, head.parts[part]))) for skin, part in APART if skin == "skin"}
     found["skin"] = self_cuts(smooth)
     return {part: count for part, count in found.items() if count}
 
 
 def _between(one: Mesh, other: Mesh):
     return piercings(one.vertices, one.triangles, other.vertices, other.triangles)
+
+
+def _in_mouth(part: str, mesh: Mesh) -> Mesh:
+    """What of a part must keep clear of the lining: of teeth the crowns, since gums rest in it and roots go through."""
+    if part not in ("teeth_upper", "teeth_lower"):
+        return mesh
+    crown = np.zeros(len(mesh.vertices), dtype=bool)
+    crown[mesh.faces[mesh.material == 0].clip(min=0).ravel()] = True
+    crown &= crowns(mesh)
+    return replace(mesh, faces=mesh.faces[crown[mesh.faces].all(axis=1) & (mesh.faces[:, 3] >= 0)])

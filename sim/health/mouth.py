@@ -2,23 +2,59 @@
 """Teeth, gums and tongue lie in the hollow of the mouth bag, and teeth are rigid."""
 
 import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from ..adapt.bone import depth_under
+from ..adapt.closest import Surface
 from ..adapt.thin_plate_spline import similarity
 from ..anatomy.head import Head
 from ..anatomy.inside import winding_number
-from .enclosure import enclosed
+from ..mesh import Mesh
 
 IN_MOUTH = ("teeth_upper", "teeth_lower", "tongue")
 #: Winding number of the skin one sees above which a place is in the head; closed lips let a little of it escape.
 ENCLOSED = 0.4
 NEAR_LIPS = 3.0  # mm
+DIP = 0.6  # mm
+FLESH = 12.0  # mm: no tooth lies deeper in it
+#: Rings of a tooth, and how many of them are its root.
+ROWS, ROOT_ROWS = 10, 2
+
+
+def crowns(mesh: Mesh) -> np.ndarray:
+    """(n,) bool: vertices of the crowns; all of them for a part without teeth.
+
+    Every tooth is a piece of its own, ring by ring from the tip of its root; roots stand in bone, outside the mouth.
+    """
+    out = np.ones(len(mesh.vertices), dtype=bool)
+    if mesh.material is None or len(np.unique(mesh.material)) < 2:
+        return out
+    enamel = mesh.faces[mesh.material == 0]
+    rows = np.unique(enamel[enamel >= 0])
+    links = np.concatenate([enamel[:, :2], enamel[:, 1:3]])
+    n = len(out)
+    label = connected_components(coo_matrix((np.ones(len(links)), links.T), shape=(n, n)), directed=False)[1][rows]
+    order = np.argsort(label, kind="stable")
+    _, start, count = np.unique(label[order], return_index=True, return_counts=True)
+    place = np.arange(len(rows)) - np.repeat(start, count)
+    out[rows[order]] = place * ROWS >= ROOT_ROWS * np.repeat(count, count)
+    return out
 
 
 def outside_bag(head: Head, part: str) -> int:
-    """Vertices of a part that are not in the mouth's hollow: in the flesh, or in front of the lips."""
+    """Vertices of crowns, gums or tongue that are not in the mouth's hollow: in the flesh, or in front of the lips.
+
+    Gums rest in the lining, so they may dip into it by `DIP`.
+    """
     mesh, skin = head.parts[part], head.skin
-    lost = enclosed(mesh, skin)
+    crown = crowns(mesh)
+    depth, found = depth_under(mesh.vertices, Surface(skin.vertices, skin.triangles), FLESH)
+    tooth = np.zeros(len(crown), dtype=bool)
+    if mesh.material is not None and part != "tongue":
+        tooth[mesh.faces[mesh.material == 0].clip(min=0).ravel()] = True
+    lost = crown & found.found & (depth > np.where(tooth, 0.0, DIP))
     # The only way out of the hollow, but through the flesh, leads between the lips.
     lips = np.maximum(head.groups["lip_upper"], head.groups["lip_lower"]) > 0.5
     near = np.flatnonzero(cKDTree(skin.vertices[lips]).query(mesh.vertices)[0] < NEAR_LIPS)
