@@ -99,7 +99,7 @@ def follow(reference: Head, skin: np.ndarray, unseen: np.ndarray | None = None) 
     jaw = carried_jaw(rest, parts, mouth, scale)
 
     yield Progress(0.8, "Muscles")
-    muscles = carried_muscles(rest, parts, rest.between(parts, final))
+    muscles = carried_muscles(rest, parts, eyes, rest.between(parts, final))
     head = replace(reference.with_vertices(parts), muscles=muscles, jaw=jaw, eyes=tuple(eyes))
     return Followed(head, moved)
 

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Muscles under a fitted skin: warped with the space between skin and bone, then kept in it (Kähler 2002, 5.2, item 3)."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from ..anatomy.head import Muscle
+from ..anatomy.muscle_room import Room
+from ..anatomy.muscle_shape import reshaped
 from .bone import depth_under
 from .closest import Surface
 from .rest import BONES, Rest
@@ -14,18 +14,18 @@ UNDER = 0.3  # mm between a muscle and the skin or the lining of the mouth, at l
 NEAR = 8.0  # mm: what is that far from a surface needs no test
 
 
-def carried_muscles(rest: Rest, parts, warp) -> tuple[Muscle, ...]:
+def carried_muscles(rest: Rest, parts, eyes, warp) -> tuple[Muscle, ...]:
     """The reference's muscles sent through ``warp`` (`Rest.between`) and kept between skin and bone.
 
-    parts : name -> (n, 3) mm of skin and bones as they are now
+    parts : name -> (n, 3) mm of skin and bones as they are now; eyes : the two `Eye`
     """
-    muscles = rest.head.muscles
-    sizes = [m.fibres.size // 3 for m in muscles] + [len(m.shape.vertices) for m in muscles]
-    points = np.concatenate([m.fibres.reshape(-1, 3) for m in muscles] + [m.shape.vertices for m in muscles])
-    cuts = np.cumsum(sizes)[:-1]
-    moved = np.split(kept_in_room(rest, points, warp.transform(points), parts), cuts)
-    count = len(muscles)
-    return tuple(_renewed(m, moved[k], moved[count + k], warp) for k, m in enumerate(muscles))
+    muscles, skin = rest.head.muscles, rest.head.skin.moved(parts["skin"])
+    points = np.concatenate([m.fibres.reshape(-1, 3) for m in muscles])
+    cuts = np.cumsum([m.fibres.size // 3 for m in muscles])[:-1]
+    fibres = np.split(kept_in_room(rest, points, warp.transform(points), parts), cuts)
+    bones = [rest.head.parts[name].moved(parts[name]) for name in BONES]
+    room = Room(skin, bones, rest.inner, [(eye.centre, eye.radius) for eye in eyes])
+    return tuple(_renewed(m, f.reshape(m.fibres.shape), room, warp) for m, f in zip(muscles, fibres, strict=True))
 
 
 def kept_in_room(rest: Rest, before, points, parts) -> np.ndarray:
@@ -57,18 +57,6 @@ def _push(points, found, lack, toward):
     points[rows] += lack[rows, None] * way / np.maximum(length, 1e-6)
 
 
-def _renewed(muscle: Muscle, fibres, shape, warp) -> Muscle:
-    fibres = fibres.reshape(muscle.fibres.shape)
-    grow = float(np.clip(_length(fibres) / max(_length(muscle.fibres), 1e-9), 0.5, 1.6)) ** 0.5
-    return replace(
-        muscle,
-        fibres=fibres,
-        shape=muscle.shape.moved(shape),
-        centre=None if muscle.centre is None else warp.transform(muscle.centre[None])[0],
-        width=muscle.width * grow,
-        thickness=muscle.thickness * grow,
-    )
-
-
-def _length(fibres) -> float:
-    return float(np.linalg.norm(np.diff(fibres, axis=1), axis=2).sum(axis=1).mean())
+def _renewed(muscle: Muscle, fibres, room: Room, warp) -> Muscle:
+    centre = None if muscle.centre is None else warp.transform(muscle.centre[None])[0]
+    return reshaped(muscle, fibres, room, centre)
