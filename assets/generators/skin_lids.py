@@ -17,8 +17,8 @@ LOWER_LID = [(17.6, 14.4), (21, 13.6), (25.5, 12.2), (31.5, 11.5), (37.5, 12.2),
 #: Depth y of the margin's inner edge by x, mm.
 MARGIN_DEPTH = ([17.6, 21, 25.5, 31.5, 37.5, 42, 45], [-84.6, -86.5, -88.2, -88.7, -87.2, -83.0, -78.0])
 
-#: Height of the lid margins over the eye's centre, mm: the lower touches the iris, the upper covers its top.
-UPPER_MARGIN, LOWER_MARGIN = 4.4, -5.9
+#: Height of the averaged lower margin over the eye's centre, mm: it touches the iris.
+LOWER_MARGIN = -5.9
 
 #: Half of the distance between the eyes' centres, mm (growth table at 25 years, sexes' mean: 61.6).
 HALF_PUPILS = 30.9
@@ -45,7 +45,7 @@ def place_lids(layout, x, head):
 
 
 #: Visible edge of the lids at rest in mm from the eye's centre, (to the side, up): inner corner first. The upper lid
-#: covers 1.5 mm of the iris, the lower touches it (oculoplastic texts); MRD1 and MRD2 as in Malik et al. 2022.
+#: covers 1 to 2 mm of the iris, the lower touches it (oculoplastic texts); MRD1 and MRD2 as in Malik et al. 2022.
 UPPER_EDGE = [
     (-14.4, -2.3),
     (-12.3, -0.6),

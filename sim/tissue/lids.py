@@ -11,8 +11,8 @@ from scipy.interpolate import PchipInterpolator
 from ..anatomy.eyeball import reach
 from ..anatomy.head import Eye, Head
 from ..mesh import edges
-from ..mesh_subdivision import limit, subdivision
 from .layers import Layers
+from .lid_edges import LidEdge, strips
 from .structures import Lids
 
 #: Share of the opening that the lower lid covers in a blink (the upper lid does the rest).
@@ -79,8 +79,8 @@ def build_lids(head: Head, layers: Layers, side: str) -> Lids | None:
     pair = edges(head.skin.faces)
     turn = np.unique(np.concatenate([pair[back[pair[:, 1]], 0], pair[back[pair[:, 0]], 1]]))
     edge = np.isin(column, turn) & ~inner & (share[column] > 0.4)
-    surface = _Edge(head, column, edge, inner, frame, eye.centre)
-    root = _roots(pair, column, surface.rows, len(v))
+    surface = LidEdge(head, column, edge, inner, frame, eye.centre)
+    root = strips(pair, column, surface.rows, len(v))
     at, level = surface.reach(v, upper)
     if len(at) >= 8:
         first, last = at.argmin(), at.argmax()
@@ -142,63 +142,7 @@ def build_lids(head: Head, layers: Layers, side: str) -> Lids | None:
     return replace(lids, seal=_seal(lids, head, surface, within))
 
 
-def _roots(pair, column, start, count) -> np.ndarray:
-    """(v,) for each lid vertex the entry of ``start`` (rows on the margin) whose strip across the lid it belongs to."""
-    row = np.full(count, -1)
-    row[column] = np.arange(len(column))
-    ends = row[pair]
-    ends = ends[(ends >= 0).all(axis=1)]
-    ends = np.concatenate([ends, ends[:, ::-1]])
-    root = np.full(len(column), -1)
-    root[start] = np.arange(len(start))
-    for _ in range(8):
-        step = ends[(root[ends[:, 0]] >= 0) & (root[ends[:, 1]] < 0)]
-        if not len(step):
-            break
-        root[step[::-1, 1]] = root[step[::-1, 0]]
-    return root
-
-
-class _Edge:
-    """How far the edges of the lids reach on the limit surface: subdivision rounds them off.
-
-    rows : (k,) rows of the lids' columns on the margin, each with its neighbour on the outer skin
-    """
-
-    def __init__(self, head: Head, column, edge, inner, frame, centre):
-        faces = head.skin.faces
-        near = np.zeros(len(head.skin.vertices), dtype=bool)
-        near[column] = True
-        for _ in range(2):
-            near[faces[near[faces].any(axis=1)].ravel()] = True
-        faces = faces[(near[faces] | (faces < 0)).all(axis=1)]
-        self.used = np.unique(faces[faces >= 0])
-        faces = np.where(faces >= 0, np.searchsorted(self.used, faces), -1)
-        fine, quads, _ = subdivision(faces, len(self.used))
-        local = np.searchsorted(self.used, column)
-        row = np.full(len(self.used), -1)
-        row[local] = np.arange(len(column))
-        pairs = edges(faces)
-        ends = row[pairs]
-        outer = np.append(~edge & ~inner, False)
-        found = [(np.append(edge, False)[ends[:, k]] & outer[ends[:, 1 - k]]) for k in (0, 1)]
-        spots = np.concatenate([np.flatnonzero(f) for f in found])
-        first = np.concatenate([pairs[f, k] for k, f in enumerate(found)])
-        second = np.concatenate([pairs[f, 1 - k] for k, f in enumerate(found)])
-        self.rows = row[first]
-        points = np.concatenate([first, len(self.used) + spots, second])
-        self.smooth = limit(quads, fine.shape[0])[points] @ fine
-        self.frame, self.centre = frame, centre
-
-    def reach(self, vertices, upper):
-        """(k,) mm along the lid and (k,) rad: the lowest of an upper, the highest of a lower edge."""
-        a, f, u = ((self.smooth @ vertices[self.used] - self.centre) @ self.frame.T).T.reshape(3, 3, -1)
-        angle = np.arctan2(u, f)
-        best = np.where(upper[self.rows], angle.argmin(axis=0), angle.argmax(axis=0))[None]
-        return np.take_along_axis(a, best, 0)[0], np.take_along_axis(angle, best, 0)[0]
-
-
-def _seal(lids: Lids, head: Head, surface: _Edge, within) -> np.ndarray:
+def _seal(lids: Lids, head: Head, surface: LidEdge, within) -> np.ndarray:
     """(v,) rad that each vertex turns on when closed, so that the limit surfaces just meet."""
     fade = lids.opening > 0.02
     upper = lids.upper[surface.rows]
