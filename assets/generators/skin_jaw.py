@@ -21,7 +21,7 @@ _CHIN = 60.0
 _FAN = ([0, 16, 45], [8.0, 9.0, 21.0])
 
 #: mm over which the share dies away below the line from chin to jaw angle: begins, ends at the throat and at the side.
-_BELOW = (10.0, 57.0, 42.0)
+_BELOW = (10.0, 57.0, 50.0)
 
 #: The same behind the rear border of the ramus: ends at the height of the ear lobe and of the jaw angle; its length.
 _BEHIND = (-5.0, 14.0, 36.0)
