@@ -107,6 +107,25 @@ def test_poles_are_few_and_none_is_on_lips_lids_or_nose_wings(head, layout):
         assert (neighbours[rings] == 4).all()
 
 
+def test_loops_run_along_brow_fold_wing_and_jaw(head, layout):
+    """Each line of the net stays within a few mm of landmarks that lie on the form it follows."""
+    at, v, grid = head.landmark_positions(), head.skin.vertices, layout.grid
+    lines = {
+        "brow": (grid[4:6, 2:11].ravel(), ("os_l", "sci_l"), 7.0),
+        "nasolabial fold": (grid[14:20, 5], ("ac_l",), 8.0),
+        "nose wing": (grid[12:16, 4], ("al_l",), 7.0),
+        "jaw line": (np.r_[grid[24, 5:14], grid[25, :5]], ("gn", "go_l"), 8.0),
+    }
+    for name, (line, marks, near) in lines.items():
+        points = v[line[line >= 0]]
+        for mark in marks:
+            assert np.linalg.norm(points - at[mark], axis=1).min() < near, (name, mark)
+    fold = v[grid[14:20, 5]]
+    assert (np.diff(fold[:, 2]) < 0).all() and (np.diff(fold[1:, 0]) > 0).all()  # down and outward round the mouth
+    jaw = v[grid[24, 0:14]]
+    assert (np.diff(jaw[:, 1]) > 0).all() and jaw[-1, 2] > jaw[0, 2] + 25  # back and up to the angle
+
+
 def test_skin_is_its_own_mirror_image(head, layout):
     vertices, mirror = head.skin.vertices, layout.mirror
     np.testing.assert_array_equal(vertices[mirror], vertices * [-1, 1, 1])

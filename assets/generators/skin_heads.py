@@ -2,7 +2,8 @@
 """The heads that `skin_average` measures, with their landmarks; they are not part of the package.
 
 ICT-FaceKit (MIT) with three random individuals, MakeHuman (CC0), Lee Perry-Smith's head (CC-BY), a head of menpo (BSD)
-and one of Cyberware. Parts that hair, smile or the scanner's shadow spoil are left out.
+and one of Cyberware. Parts that hair, smile or the scanner's shadow spoil are left out. The folder holds
+``ict/neutral.ply`` with landmarks and ``ict/examples``, ``makehuman/mh_heads.npz`` and ``scans``.
 """
 
 import json
@@ -110,7 +111,7 @@ def _makehuman(folder: Path) -> Iterator[MeasuredSubject]:
 
 
 def heads(folder: Path) -> Iterator[MeasuredSubject]:
-    """All heads; the folder's layout is told in `skin_average`."""
+    """All heads of the folder."""
     yield first_head(folder)
     for name in ("s1", "s2", "s3"):
         with np.load(folder / "ict" / "examples" / f"{name}_base.npz") as file:
