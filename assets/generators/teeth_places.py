@@ -117,7 +117,7 @@ def _rows():
     above = Touch(upper + [mirrored(upper[0])])
     for _ in range(3):
         lower = _row(LOWER, LOWER_ARCH, lower_front, +1, rise)
-        rise = rise + [_seat(above, place, front=k < 3) for k, place in enumerate(lower)]
+        rise = rise + [_seat(above, place, front=k < 2) for k, place in enumerate(lower)]
     lower = _row(LOWER, LOWER_ARCH, lower_front, +1, rise)
     return {"upper": upper, "lower": lower}
 

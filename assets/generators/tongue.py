@@ -2,6 +2,7 @@
 """The tongue at rest: tip behind the lower incisors, domed back with its median groove, root going down and back."""
 
 import numpy as np
+from scipy.ndimage import gaussian_filter1d
 
 from ...sim.mesh import Mesh
 from .mouth_room import MouthRoom
@@ -11,21 +12,12 @@ from .teeth_shape import tube_faces
 AROUND, ALONG = 20, 20
 
 #: Middle line of the upper side and of the underside, tip to root: share of the way back, mm over the line of the lips.
-TOP = (
-    (0.0, -3.6),
-    (0.035, -1.8),
-    (0.13, 0.4),
-    (0.3, 3.4),
-    (0.5, 6.4),
-    (0.68, 7.4),
-    (0.83, 5.6),
-    (0.94, 0.6),
-    (1, -7.0),
-)
-UNDER = ((0.0, -4.6), (0.04, -6.0), (0.12, -8.0), (0.22, -11.5), (0.36, -15), (0.5, -16.5), (0.66, -17), (0.8, -16.5),
-         (0.9, -14.5))  # fmt: skip
+TOP = ((0.0, -3.3), (0.02, -1.7), (0.07, -0.3), (0.16, 1.4), (0.32, 4.0), (0.5, 6.6), (0.68, 7.4), (0.84, 5.4),
+       (0.95, -0.5), (1, -8.0))  # fmt: skip
+UNDER = ((0.0, -4.7), (0.02, -6.2), (0.07, -7.8), (0.15, -9.4), (0.25, -12.5), (0.38, -15.5), (0.52, -16.8), (0.68, -17),
+         (0.8, -16.5), (0.9, -14.5))  # fmt: skip
 #: mm kept to teeth and gums, to the roof of the mouth, to its floor and walls.
-BESIDE, ABOVE, CLEAR = 1.0, 2.2, 0.8
+BESIDE, ABOVE, CLEAR = 0.9, 2.2, 0.8
 
 
 def make_tongue(
@@ -34,8 +26,8 @@ def make_tongue(
     """The tongue's mesh of quads, within the rows of teeth and the lining of the mouth, mm."""
     room = MouthRoom(skin, groups, landmarks)
     teeth = np.concatenate([_enamel(teeth_upper), teeth_lower.vertices])
-    teeth = teeth[np.abs(teeth[:, 2] - room.line) < 14]
-    front = teeth[(np.abs(teeth[:, 0]) < 3) & (teeth[:, 2] < room.line - 2), 1].max() + BESIDE
+    teeth = teeth[np.abs(teeth[:, 2] - room.line) < 10]
+    front = teeth[(np.abs(teeth[:, 0]) < 3) & (teeth[:, 2] < room.line - 1), 1].max() + 1.2
     back = room.back - 2.0
     top, under = (curve(np.array(line), ALONG) for line in (TOP, UNDER))
     turn = np.linspace(-np.pi / 2, np.pi / 2, AROUND // 2 + 1)  # left half, from under the tongue to its back
@@ -54,7 +46,7 @@ def make_tongue(
     share = np.linspace(0, 1, ALONG)[:, None]
     wide = wide * np.interp(share, [0, 0.85, 1], [1, 1, 0.8])
     rings[..., 0] = wide * side**0.75 * np.where(up < 0, 1 - 0.35 * up**2 * np.interp(share, [0, 0.3], [0, 1]), 1.0)
-    rings[..., 2] -= 1.1 * np.exp(-((rings[..., 0] / 2.2) ** 2)) * (up > 0.3) * np.sin(np.pi * share) ** 0.7
+    rings[..., 2] -= 1.6 * np.exp(-((rings[..., 0] / 2.6) ** 2)) * (up > 0.3) * np.sin(np.pi * share) ** 0.7
     points = room.kept_in(rings.reshape(-1, 3), CLEAR).reshape(rings.shape)
     points[:, [0, -1], 0] = 0.0
     whole = np.concatenate([points, points[:, -2:0:-1] * [-1, 1, 1]], axis=1)
@@ -76,6 +68,7 @@ def _half_width(teeth, y):
     at = np.linspace(teeth[:, 1].min(), teeth[:, 1].max(), 60)
     inner = []
     for each in at:
-        near = np.abs(teeth[np.abs(teeth[:, 1] - each) < 1.3, 0])
+        near = np.abs(teeth[np.abs(teeth[:, 1] - each) < 0.9, 0])
         inner.append(near[near > 2].min(initial=40.0))
-    return np.interp(y, at, np.minimum.accumulate(np.array(inner)[::-1])[::-1]) - BESIDE
+    inner = np.minimum.accumulate(np.array(inner)[::-1])[::-1]
+    return np.interp(y, at, gaussian_filter1d(inner, 2.0, mode="nearest")) - BESIDE
