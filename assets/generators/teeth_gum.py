@@ -18,7 +18,7 @@ from .teeth_shape import tooth_points
 MARGIN = 0.6
 PAPILLA = {"incisor": 4.6, "canine": 4.2, "premolar": 3.3, "molar": 2.9}
 #: mm between the gum's face and the lining, and of its back.
-CLEAR, BACK_CLEAR = 0.85, 0.35
+CLEAR, BACK_CLEAR = 0.85, 0.3
 #: Steps from the lingual side of the ridge to the middle of the palate.
 PALATE = 6
 #: From the margin away: mm toward the root, mm outward of the neck.
@@ -27,7 +27,8 @@ _FLANK = ((0.9, 0.45), (2.6, 0.85), (5.8, 1.2))
 
 class Section(NamedTuple):
     """A cut through the ridge. centre (3,) mm at the level of the necks; out, crown (3,) unit; labial, lingual (2,): how
-    far the margin stands out and up there; half: mm from the centre to the neck's faces; shrink 0..1 at the ends."""
+    far the margin stands out and up there; half: mm from the centre to the neck's faces; shrink, depth: shares of width
+    and height that are left at the ends."""
 
     centre: np.ndarray
     out: np.ndarray
@@ -36,6 +37,7 @@ class Section(NamedTuple):
     lingual: np.ndarray
     half: float
     shrink: float = 1.0
+    depth: float = 1.0
 
 
 def gum(places, rise: int, room: MouthRoom) -> tuple[np.ndarray, np.ndarray]:
@@ -43,7 +45,7 @@ def gum(places, rise: int, room: MouthRoom) -> tuple[np.ndarray, np.ndarray]:
     sections = _sections(places)
     ridge = np.array([_over_the_ridge(s) for s in sections])
     ridge[:, [0, 1, 8, 9]] = _evened(ridge[:, [0, 1, 8, 9]], 1.0)
-    ridge = _inside(ridge, rise, room)
+    ridge = _inside(ridge, room)
     sheet = np.concatenate([ridge, _palate(ridge, rise, room)], axis=1) if rise > 0 else ridge
     sheet[0, :, 0] = 0.0
     return _closed(sheet, rise, room)
@@ -70,11 +72,11 @@ def _on_midline(s):
 def _end(place, last):
     """Sections behind the last molar, where the ridge rounds off."""
     found, half = [], last.half
-    for far, up, shrink in ((0.3, 1.3, 0.95), (1.4, 1.1, 0.86), (2.5, 0.4, 0.64), (3.1, -0.7, 0.34)):
+    for far, up, shrink in ((0.3, 1.3, 0.95), (1.6, 1.0, 0.86), (2.8, 0.0, 0.66), (3.6, -1.6, 0.4), (3.9, -3.4, 0.1)):
         centre = place.neck + (place.tooth.md_neck / 2 + far) * place.axes[0]
         margin = np.array([0.62 * half * shrink, up])
         found.append(last._replace(centre=centre, out=place.axes[1], crown=place.axes[2], labial=margin,
-                                   lingual=margin * [-1, 1], shrink=shrink))  # fmt: skip
+                                   lingual=margin * [-1, 1], shrink=shrink, depth=(5.2 + up) / 6.6))  # fmt: skip
     return found
 
 
@@ -125,22 +127,19 @@ def _over_the_ridge(s: Section):
     outline = []
     for (y, up), way in ((s.labial, 1), (s.lingual, -1)):
         stand = way * s.half * s.shrink
-        flank = [(stand + way * out * s.shrink, min(up, 0.8) - down) for down, out in _FLANK]
-        flank[0] = ((flank[0][0] + y) / 2 + 0.1 * way, up - 0.55 * _FLANK[0][0])
+        flank = [(stand + way * out * s.shrink, min(up, 0.8) - down * s.depth) for down, out in _FLANK]
+        flank[0] = ((flank[0][0] + y) / 2 + 0.1 * way, up - 0.55 * _FLANK[0][0] * s.depth)
         tuck = (y - way * min(1.1, 0.25 * abs(y)), up + 0.05)
         outline.append([*flank[::-1], (y, up), tuck])
     path = np.array(outline[0] + outline[1][::-1])
     return s.centre + path[:, :1] * s.out + path[:, 1:] * s.crown
 
 
-def _inside(sheet, rise, room):
-    """The sheet kept in the mouth: under its roof (or over its floor) and off its walls, evenly along the row."""
+def _inside(sheet, room):
+    """The sheet moved off the lining of the mouth, evenly along the row."""
     shape = sheet.shape
-    points = sheet.reshape(-1, 3).copy()
-    highest = rise * room.limit(points[:, :2], rise) - CLEAR
-    points[:, 2] = rise * np.minimum(rise * points[:, 2], highest)
-    moved = (room.kept_in(points, CLEAR) - sheet.reshape(-1, 3)).reshape(shape)
-    return sheet + _evened(moved, 1.2)
+    moved = (room.kept_in(sheet.reshape(-1, 3), CLEAR, 6) - sheet.reshape(-1, 3)).reshape(shape)
+    return room.kept_in((sheet + _evened(moved, 1.2)).reshape(-1, 3), 0.6 * CLEAR).reshape(shape)
 
 
 def _evened(rows, sigma):
@@ -187,7 +186,7 @@ def _closed(sheet, rise, room):
     quads = np.stack([left[1:, :-1], left[1:, 1:], left[:-1, 1:], left[:-1, :-1]], axis=-1).reshape(-1, 4)
     other = np.stack([right[1:, :-1], right[:-1, :-1], right[:-1, 1:], right[1:, 1:]], axis=-1).reshape(-1, 4)
     faces = np.concatenate([quads, other])
-    if rise < 0:
+    if rise > 0:
         faces = faces[:, [0, 3, 2, 1]]
     used = np.unique(faces)
     new = np.full(len(vertices), -1)
@@ -195,16 +194,25 @@ def _closed(sheet, rise, room):
     vertices, faces = vertices[used], new[faces]
     triangles = np.concatenate([faces[:, :3], faces[:, [0, 2, 3]]])
     normal = vertex_normals(vertices, triangles)
-    back = vertices - 0.9 * normal
-    highest = rise * room.limit(back[:, :2], rise) - BACK_CLEAR
-    back[:, 2] = rise * np.minimum(rise * back[:, 2], highest)
-    back = room.kept_in(back, BACK_CLEAR)
+    deep = np.full((2, rows, columns), 0.6)
+    deep[..., [0, 2, 4, 5, 7]] = 0.4, 1.7, 1.0, 1.0, 1.7
+    back = _behind(vertices, normal, deep.ravel()[used], room)
     back = (back + _mirror(vertices, back)) / 2
     return _backed(vertices, back, faces, new[left], new[right])
 
 
+def _behind(vertices, normal, deep, room):
+    """Points under a sheet, ``deep`` (n,) mm down or less where the lining of the mouth is near."""
+    back = vertices.copy()
+    for share in (0.2, 0.35, 0.5, 0.7, 1.0):
+        lower = vertices - (share * deep)[:, None] * normal
+        free = room.clearance(lower)[0] > BACK_CLEAR
+        back[free] = lower[free]
+    return back
+
+
 #: Columns of the sheet that its back keeps, below and above.
-_KEPT = {10: (0, 2, 4, 7, 9), 10 + PALATE: (0, 2, 4, 7, 9, 11, 13, 15)}
+_KEPT = {10: (0, 2, 4, 5, 7, 9), 10 + PALATE: (0, 2, 4, 5, 7, 9, 11, 13, 15)}
 
 
 def _backed(vertices, back, faces, left, right):

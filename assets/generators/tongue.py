@@ -28,7 +28,7 @@ def make_tongue(
     teeth = np.concatenate([_enamel(teeth_upper), teeth_lower.vertices])
     teeth = teeth[np.abs(teeth[:, 2] - room.line) < 10]
     front = teeth[(np.abs(teeth[:, 0]) < 3) & (teeth[:, 2] < room.line - 1), 1].max() + 1.2
-    back = room.back - 2.0
+    back = room.back - 6.0
     top, under = (curve(np.array(line), ALONG) for line in (TOP, UNDER))
     turn = np.linspace(-np.pi / 2, np.pi / 2, AROUND // 2 + 1)  # left half, from under the tongue to its back
     side, up = np.cos(turn), np.sin(turn)
@@ -41,8 +41,8 @@ def make_tongue(
     roof, floor = (room.limit(plan, way).reshape(rings.shape[:2]) for way in (1, -1))
     rings[..., 2] = np.maximum(np.minimum(rings[..., 2], roof - ABOVE), floor + CLEAR)
     way = (rings[:, :, 1].mean(axis=1) - front)[:, None]
-    tip = 19.0 * np.sqrt(np.clip(1 - (1 - (way + 0.8) / 17) ** 2, 0.02, 1))
-    wide = np.minimum(_half_width(teeth, rings[..., 1]), np.where(way < 16, tip, np.inf))
+    tip = 19.0 * np.sqrt(np.clip(1 - (1 - (way + 1.4) / 14) ** 2, 0.02, 1))
+    wide = np.minimum(_half_width(teeth, rings[..., 1]), np.where(way < 12, tip, np.inf))
     share = np.linspace(0, 1, ALONG)[:, None]
     wide = wide * np.interp(share, [0, 0.85, 1], [1, 1, 0.8])
     rings[..., 0] = wide * side**0.75 * np.where(up < 0, 1 - 0.35 * up**2 * np.interp(share, [0, 0.3], [0, 1]), 1.0)
