@@ -30,7 +30,7 @@ SCHEDULE = (
 ALONG = 0.02  # weight of a pull along the surface against one across it
 AGREE = 0.6  # cosine between the normals of skin and scan
 WHOLE = 150.0  # mm²: a piece of data smaller than this is trusted in proportion
-FINEST = 20.0  # most by which fine parts of the mesh are stiffened
+FINEST = 4.0  # most by which fine parts of the mesh are stiffened
 STRETCH = 0.002  # weight of first differences, which keeps the mesh from sliding where bending is free
 
 
