@@ -48,7 +48,7 @@ def tangled(vertices, triangles, allowed=frozenset(), among=None):
 
 
 def untangled(rest: "Rest", vertices, visible, hold=None, rounds: int = 6):
-    """The vertices (n, 3) with tangles smoothed away, of the surface drawn and of its cage.
+    """The vertices (n, 3) with tangles smoothed away, of the surface drawn, and of its cage where that is not seen.
 
     Parameters
     ----------
@@ -59,10 +59,12 @@ def untangled(rest: "Rest", vertices, visible, hold=None, rounds: int = 6):
     triangles, link = rest.head.skin.triangles, rest.link
     out = np.array(vertices, dtype=float)
     patch = np.zeros(len(out), dtype=bool)
+    hidden = ~visible[triangles].all(axis=1)
     best, fewest, among = out, None, None
     for turn in range(rounds):
         wrong = tangled(drawn(rest.head.skin.faces, out), triangles, rest.folds, among)
-        wrong[triangles[self_piercings(out, triangles, among).ravel()].ravel()] = True
+        pairs = self_piercings(out, triangles, among)
+        wrong[triangles[pairs[hidden[pairs].all(axis=1)].ravel()].ravel()] = True
         if hold is not None:
             wrong &= ~hold
         if fewest is None or wrong.sum() < fewest:
