@@ -3,7 +3,6 @@
 
 import numpy as np
 import pytest
-from scipy.spatial import cKDTree
 
 from headshop.sim.anatomy.head import MATERIALS
 from headshop.sim.anatomy.inside import inside, winding_number
@@ -32,30 +31,21 @@ def volume(mesh):
     return np.einsum("ij,ij->", corner[:, 0], np.cross(corner[:, 1], corner[:, 2])) / 6
 
 
-@pytest.mark.parametrize("part", ["eye_l", "eye_r", "teeth_upper", "teeth_lower", "tongue"])
+@pytest.mark.parametrize("part", ["eye_l", "eye_r"])
 def test_parts_are_closed_and_dressed(head, part):
     mesh = head.parts[part]
     assert closed(mesh) and volume(mesh) > 0
     assert set(np.unique(mesh.material)) == set(range(len(MATERIALS[part])))
 
 
-@pytest.mark.parametrize("part", ["eye_l", "eye_r", "teeth_upper", "teeth_lower", "tongue"])
+@pytest.mark.parametrize("part", ["eye_l", "eye_r"])
 def test_parts_hide_behind_the_skin(head, part):
-    least = 0.05 if part.startswith("eye") else 0.4  # the eyes are open
-    assert (winding_number(head.parts[part].vertices, head.skin.vertices, outer_skin(head)) > least).all()
-
-
-@pytest.mark.parametrize("part", ["teeth_upper", "teeth_lower", "tongue"])
-def test_nothing_pokes_through_the_mouth(head, part):
-    """Teeth and tongue are in the mouth's hollow, not in the flesh of lips and cheeks."""
-    assert not inside(head.parts[part].vertices, head.skin.vertices, head.skin.triangles).any()
+    # the eyes are open
+    assert (winding_number(head.parts[part].vertices, head.skin.vertices, outer_skin(head)) > 0.05).all()
 
 
 def test_sides_mirror(head):
     np.testing.assert_allclose(head.parts["eye_l"].vertices * [-1, 1, 1], head.parts["eye_r"].vertices, atol=1e-9)
-    for part in ("teeth_upper", "teeth_lower", "tongue"):
-        vertices = head.parts[part].vertices
-        assert cKDTree(vertices).query(vertices * [-1, 1, 1])[0].max() < 0.02
 
 
 def test_eyes_touch_the_lids_and_look_ahead(head):
@@ -68,39 +58,6 @@ def test_eyes_touch_the_lids_and_look_ahead(head):
         lids = head.groups[f"lid_upper_{side}"] + head.groups[f"lid_lower_{side}"] > 0.5
         distance = np.linalg.norm(head.skin.vertices[lids] - eye.centre, axis=1)
         assert -0.2 < distance.min() - eye.radius < 1.0
-
-
-def pieces(mesh):
-    """Vertex index arrays of the enamel's connected pieces."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
-    t = mesh.triangles
-    n = len(mesh.vertices)
-    link = coo_matrix((np.ones(2 * len(t)), (np.r_[t[:, 0], t[:, 0]], np.r_[t[:, 1], t[:, 2]])), shape=(n, n))
-    label = connected_components(link, directed=False)[1]
-    enamel = np.unique(mesh.faces[mesh.material == 0][:, :3])
-    return [np.flatnonzero(label == k) for k in np.unique(label[enamel])]
-
-
-def test_thirty_two_teeth(head):
-    assert [len(pieces(head.parts[p])) for p in ("teeth_upper", "teeth_lower")] == [16, 16]
-
-
-def test_rows_bite_without_cutting(head):
-    upper, lower = head.parts["teeth_upper"], head.parts["teeth_lower"]
-    bite = {}
-    for name, mesh in (("upper", upper), ("lower", lower)):
-        enamel = np.unique(mesh.faces[mesh.material == 0][:, :3])
-        v = mesh.vertices[enamel]
-        bite[name] = v[np.abs(v[:, 0]) < 4]
-    overlap = bite["lower"][:, 2].max() - bite["upper"][:, 2].min()
-    assert 0.2 < overlap < 4
-    edge_upper = bite["upper"][bite["upper"][:, 2].argmin()]
-    edge_lower = bite["lower"][bite["lower"][:, 2].argmax()]
-    assert 0.5 < edge_lower[1] - edge_upper[1] < 5  # overjet: the lower edge bites behind
-    assert not inside(lower.vertices, upper.vertices, upper.triangles).any()
-    assert not inside(upper.vertices, lower.vertices, lower.triangles).any()
 
 
 def test_tongue_rests_within_the_lower_row(head):

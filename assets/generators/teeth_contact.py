@@ -42,8 +42,9 @@ class Touch:
             return reach
         near = near[found]
         height = ((at[found] - self.points[near]) * self.normals[near]).sum(axis=1)
-        inside = height < -0.3 * distance[found]
-        return float(np.where(inside, height, distance[found]).min())
+        # samples that face each other tell the gap by its height, being up to half a spacing apart sideways
+        facing = (distance[found] < 1.2 * SPACING) | (height < -0.3 * distance[found])
+        return float(np.where(facing, height, distance[found]).min())
 
 
 def first_touch(gap, low: float, high: float, wanted: float = CONTACT, steps: int = 14) -> float:
