@@ -198,7 +198,7 @@ class _Maker:
         for part, end in ((row["origin_part"], 0), (row["insertion_part"], -1)):
             if part not in self.bones:
                 continue
-            bone = self.bones[part]
+            bone = self.bones[part][0]
             at = fibres[:, end]
             _, _, far = bone.height(at, reach)
             shift = np.where((np.isfinite(far) & (far > 3.0))[:, None], bone.nearest(at) - at, 0.0)

@@ -63,15 +63,16 @@ class Layers:
             if k in (1, 4, 8):
                 fibres = fibres + keep[..., None] * self._rise(fibres, half, level, ring)
             flat = fibres.reshape(-1, 3)
-            for bone in self.room.bones:
+            for bone, *_ in self.room.bones:
                 height, normal, _ = bone.height(flat, 12.0)
                 flat = flat + np.clip(clear.ravel() - height, 0, 4.0)[:, None] * normal
-            if self.room.lining is not None:
-                height, normal, far = self.room.lining.height(flat, 8.0)
+            for lining in self.room.linings[:1]:
+                height, normal, far = lining.height(flat, 8.0)
                 need = np.where(np.isfinite(far), np.clip(height + 0.3 + 0.8 * half.ravel(), 0, 3.0), 0)
                 flat = flat - need[:, None] * normal
-            height, normal, _ = self.room.skin.height(flat)
-            flat = flat - np.maximum(height + SKIN_CLEAR + half.ravel(), 0)[:, None] * normal
+            height, normal, far = self.room.skin.height(flat, 8.0)
+            need = np.where(np.isfinite(far), np.maximum(height + SKIN_CLEAR + half.ravel(), 0), 0)
+            flat = flat - need[:, None] * normal
             fibres = np.where(node, held, flat.reshape(shape))
         return fibres
 

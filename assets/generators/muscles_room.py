@@ -66,10 +66,10 @@ class Tissue:
         steps = np.arange(1.0, 30.0, 0.75)
         ray = foot[:, None] - steps[None, :, None] * normal[:, None]
         flat = ray.reshape(-1, 3)
-        height = np.min([b.about(flat) for b in self._room.bones], axis=0).reshape(ray.shape[:2])
+        height = np.min([bone.about(flat) for bone, *_ in self._room.bones], axis=0).reshape(ray.shape[:2])
         hit = height < 0.0
-        if self._room.lining is not None:
-            hit |= (self._room.lining.height(flat, 1.2)[2] < 1.2).reshape(ray.shape[:2]) & (steps > 2)
+        for lining in self._room.linings[:1]:
+            hit |= (lining.height(flat, 1.2)[2] < 1.2).reshape(ray.shape[:2]) & (steps > 2)
         first = hit.argmax(axis=1)
         row = np.arange(len(foot))
         before = np.maximum(height[row, np.maximum(first - 1, 0)], 0)  # from the last step outside, as far as is left

@@ -23,19 +23,23 @@ class Room:
 
     def __init__(self, skin: Mesh, bones: list[Mesh], inner: np.ndarray | None = None, eyes=()):
         inner = np.zeros(len(skin.vertices), bool) if inner is None else np.asarray(inner, bool)
-        triangles = both_ways(skin.faces)
-        lining = inner[triangles].all(axis=1)
-        normals = vertex_normals(skin.vertices, triangles)
-        self.skin = Samples(skin.vertices, triangles[~lining], normals)
-        self.lining = Samples(skin.vertices, triangles[lining], normals, SPACING / 2) if lining.any() else None
-        self.bones = [Samples(mesh.vertices, both_ways(mesh.faces)) for mesh in bones]
+        normals = vertex_normals(skin.vertices, both_ways(skin.faces))
+        self.skins, self.linings = [], []
+        for triangles in diagonals(skin.faces):
+            lining = inner[triangles].all(axis=1)
+            self.skins.append(Samples(skin.vertices, triangles[~lining], normals))
+            if lining.any():
+                self.linings.append(Samples(skin.vertices, triangles[lining], normals, SPACING / 2))
+        self.skin = self.skins[0]
+        #: For each bone its surface with quads split along one diagonal and along the other.
+        self.bones = [[Samples(mesh.vertices, t) for t in diagonals(mesh.faces)] for mesh in bones]
         self.eyes = tuple(eyes)
 
     def outward(self, points) -> np.ndarray:
         """(n, 3) unit direction to the skin's outside, smoothed over some mm."""
         return self.skin.smooth_normal(points)
 
-    def fitted(self, points, rounds: int = 6) -> np.ndarray:
+    def fitted(self, points, rounds: int = 12) -> np.ndarray:
         """``points`` (n, 3) mm brought into the soft tissue by the shortest way; the skin has the last word."""
         points = np.array(points, dtype=float)
         todo = np.arange(len(points))
@@ -49,7 +53,7 @@ class Room:
         return points
 
     def _fitted_once(self, points):
-        for solid in self.bones:
+        for solid in (each for bone in self.bones for each in bone):
             height, normal, _ = solid.height(points, 10.0)
             push = np.minimum(np.maximum(BONE_CLEAR - height, 0), 3.0)
             points = points + push[:, None] * normal
@@ -57,17 +61,25 @@ class Room:
             away = points - centre
             far = np.linalg.norm(away, axis=1, keepdims=True)
             points = np.where(far < radius + EYE_CLEAR, centre + away / far * (radius + EYE_CLEAR), points)
-        if self.lining is not None:
-            points = _under(points, self.lining, LINING_CLEAR, 6.0)
-        return _under(points, self.skin, SKIN_CLEAR, 20.0)
+        for surface in self.linings:
+            points = _under(points, surface, LINING_CLEAR, 6.0)
+        for surface in self.skins:
+            points = _under(points, surface, SKIN_CLEAR, 5.0)  # farther in, the rim of the lids would mislead
+        return points
+
+
+def diagonals(faces):
+    """Triangles (t, 3) of quads split along the one diagonal, and along the other; triangles are in both."""
+    quads = np.where(faces[:, 3:] >= 0, faces, faces[:, [0, 1, 2, 0]])
+    for corners in (((0, 1, 2), (0, 2, 3)), ((1, 2, 3), (1, 3, 0))):
+        triangles = np.concatenate([quads[:, corner] for corner in corners])
+        whole = (triangles != np.roll(triangles, 1, axis=1)).all(axis=1)
+        yield np.concatenate([triangles[whole], faces[faces[:, 3] < 0][:, :3]]) if corners[0][0] else triangles[whole]
 
 
 def both_ways(faces) -> np.ndarray:
-    """(t, 3): quads split along either diagonal, triangles twice, so that a surface and its mirror image agree."""
-    quads = np.where(faces[:, 3:] >= 0, faces, faces[:, [0, 1, 2, 0]])
-    parts = [quads[:, [0, 1, 2]], quads[:, [0, 2, 3]], quads[:, [1, 2, 3]], quads[:, [1, 3, 0]]]
-    triangles = np.concatenate(parts)
-    return triangles[(triangles != np.roll(triangles, 1, axis=1)).all(axis=1)]
+    """(t, 3): quads split along either diagonal, so that a surface and its mirror image agree."""
+    return np.concatenate(list(diagonals(faces)))
 
 
 def _under(points, surface, clear, reach):
