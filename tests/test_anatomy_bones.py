@@ -4,11 +4,15 @@
 import numpy as np
 import pytest
 
+from headshop.assets.generators.teeth_places import tooth_places
+from headshop.sim.adapt.bone import depth_under
+from headshop.sim.adapt.closest import Surface
 from headshop.sim.anatomy.inside import inside, winding_number
 from headshop.sim.anatomy.landmark_names import SKULL, mirrored
 from headshop.sim.anatomy.storage import load_head
 from headshop.sim.anatomy.tissue_depth import depths, skin_counterparts, skull_targets, tissue_vectors
 from headshop.sim.mesh import Mesh
+from headshop.sim.tissue.jaw import jaw_transform, opening_mm
 
 CUBE = Mesh(
     np.array([(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)], float),
@@ -19,6 +23,10 @@ CUBE = Mesh(
 @pytest.fixture(scope="module")
 def head():
     return load_head()
+
+
+def test_bones_are_light(head):
+    assert len(head.parts["skull"].vertices) + len(head.parts["mandible"].vertices) < 8000
 
 
 def closed_and_even(mesh):
@@ -37,6 +45,16 @@ def off_mirror(mesh):
     from scipy.spatial import cKDTree
 
     return cKDTree(mesh.vertices).query(mesh.vertices * [-1, 1, 1])[0].max()
+
+
+def mirrored_faces(mesh):
+    """Whether the mirror image has the same triangles, so that both halves shade alike."""
+    from scipy.spatial import cKDTree
+
+    twin = cKDTree(mesh.vertices).query(mesh.vertices * [-1, 1, 1])[1]
+    here = np.unique(np.sort(mesh.triangles, axis=1), axis=0)
+    there = np.unique(np.sort(twin[mesh.triangles], axis=1), axis=0)
+    return np.array_equal(here, there)
 
 
 def test_winding_number_of_a_cube():
@@ -97,9 +115,10 @@ def test_mandible_does_not_cut_the_skull(head):
 def test_bones_are_closed_symmetric_quads(head, part):
     mesh = head.parts[part]
     assert closed_and_even(mesh)
-    assert off_mirror(mesh) < 0.02
+    assert off_mirror(mesh) < 1e-6
+    assert mirrored_faces(mesh)
     assert (mesh.faces[:, 3] >= 0).mean() > 0.9
-    assert 500 < len(mesh.vertices) < 7000
+    assert 500 < len(mesh.vertices) < 6000
 
 
 def test_skull_has_orbits_and_a_nose(head):
@@ -123,27 +142,116 @@ def test_zygomatic_arch_is_free(head):
     assert (~inside(gap, skull.vertices, skull.triangles)).sum() >= 5
 
 
-def turned(points, jaw, angle, slide):
-    """The mandible's motion: a turn about the hinge and a slide of the condyles forward and down."""
-    middle = (jaw.condyle_l + jaw.condyle_r) / 2
-    c, s = np.cos(angle), np.sin(angle)
-    turn = np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
-    return (points - middle) @ turn.T + middle + slide * np.array([0, -0.8, -0.6])
-
-
 def test_jaw_opens_in_its_joint(head):
-    jaw, mandible, skull = head.jaw, head.parts["mandible"], head.parts["skull"]
+    jaw, mandible = head.jaw, head.parts["mandible"]
     np.testing.assert_allclose(jaw.condyle_l * [-1, 1, 1], jaw.condyle_r, atol=1e-6)
     assert inside([jaw.condyle_l, jaw.condyle_r], mandible.vertices, mandible.triangles).all()
-    assert 0.2 < jaw.open_max < 0.7
-    sign = 1 if turned(jaw.incisor, jaw, 0.1, 0)[2] < jaw.incisor[2] else -1
-    opened = turned(mandible.vertices, jaw, sign * jaw.open_max, jaw.slide_max)
-    incisor = turned(jaw.incisor, jaw, sign * jaw.open_max, jaw.slide_max)
-    assert 35 < np.linalg.norm(incisor - jaw.incisor) < 65
-    assert incisor[2] < jaw.incisor[2] - 30
-    np.testing.assert_allclose(opened[:, 0], mandible.vertices[:, 0], atol=1e-9)
-    deep = inside(opened, skull.vertices, skull.triangles)
-    assert deep.mean() < 0.02  # the condyle may brush the eminence it slides along
+    assert 45 < opening_mm(jaw, 1.0) < 50
+    assert opening_mm(jaw, 1.3) == opening_mm(jaw, 1.0)
+    rotation, translation = jaw_transform(jaw, 1.0)
+    incisor = rotation @ jaw.incisor + translation
+    assert incisor[2] < jaw.incisor[2] - 35 and abs(incisor[0]) < 1e-9
+    # The first third turns almost purely; then the condyles slide forward and down.
+    third, full = (slid(jaw, (x, 0, 0))[0] for x in (0.33, 1.0))
+    assert np.linalg.norm(third) < 2 and 6 < np.linalg.norm(full) < 12
+    assert full[1] < -4 and full[2] < -2
+
+
+def slid(jaw, pose):
+    """How far the left and the right condyle and the incisors go."""
+    rotation, translation = jaw_transform(jaw, *pose)
+    return [rotation @ p + translation - p for p in (jaw.condyle_l, jaw.condyle_r, jaw.incisor)]
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_jaw_goes_aside_about_the_working_condyle(head, side):
+    left, right, incisor = slid(head.jaw, (0, 0, side))
+    working, other = (left, right) if side > 0 else (right, left)
+    assert 8 < side * incisor[0] < 10
+    assert np.linalg.norm(working) < 1.6
+    assert 6 < np.linalg.norm(other) < 12 and other[1] < -5 and other[2] < -2  # forward and down
+    # Nothing is left of it in the wide open mouth.
+    wide = np.subtract(slid(head.jaw, (1, 0, side)), slid(head.jaw, (1, 0, 0)))
+    assert np.abs(wide).max() < 1e-9
+
+
+def test_jaw_comes_forward_but_hardly_back(head):
+    assert 7 < np.linalg.norm(slid(head.jaw, (0, 1, 0))[2]) < 9
+    assert np.linalg.norm(slid(head.jaw, (0, -1, 0))[2]) < 1.5
+    assert np.linalg.norm(slid(head.jaw, (0, 3, 0))[2]) < 9
+
+
+POSES = [
+    *((x, 0.0, 0.0) for x in (0.1, 0.3, 0.5, 0.7, 0.9, 1.0)), (0, 1, 0), (0, 0.5, 0), (0, -1, 0), (0.3, 0, 1), (0, 0, 1),
+    (0, 0, 0.5), (0.5, 1, 0), (0, 0.6, 1), (0.7, 0, 1),
+]  # fmt: skip
+
+
+def test_jaw_moves_without_cutting_the_skull(head):
+    """Over its whole range the mandible stays clear of the skull; the condyle may brush the eminence by 0.3 mm."""
+    jaw, mandible, skull = head.jaw, head.parts["mandible"], head.parts["skull"]
+    surface = Surface(skull.vertices, skull.triangles)
+    high = mandible.vertices[mandible.vertices[:, 2] > jaw.incisor[2] + 12]
+    for pose in POSES:
+        rotation, translation = jaw_transform(jaw, *pose)
+        moved = high @ rotation.T + translation
+        cut = moved[inside(moved, skull.vertices, skull.triangles)]
+        assert not len(cut) or depth_under(cut, surface, 6.0)[0].max() < 0.3, pose
+
+
+@pytest.mark.parametrize(("part", "row"), [("skull", "upper"), ("mandible", "lower")])
+def test_every_tooth_has_a_socket(head, part, row):
+    """Under each of the sixteen necks the bone is open, with walls on the side of the lips and of the tongue."""
+    mesh = head.parts[part]
+    groups = {n: np.asarray(w) for n, w in head.groups.items()}
+    places = tooth_places(head.skin, groups, head.landmark_positions())[row]
+    for flip in ([1, 1, 1], [-1, 1, 1]):
+        for number, place in enumerate(places):
+            way = (place.neck + np.outer(np.arange(1.0, 18, 0.25), place.axis)) * flip
+            free = ~inside(way, mesh.vertices, mesh.triangles)
+            end = free.argmin()
+            assert not free.all() and 2 < end * 0.25 + 1 < 17, (row, number)
+            # A ring round the root somewhere above the socket's end lies in bone.
+            turn = np.linspace(0, 2 * np.pi, 16, endpoint=False)
+            best = 0.0
+            for back in (0.5, 1.0, 1.5, 2.0, 2.5, 3.0):
+                centre = place.neck + place.axis * (end * 0.25 + 1 - back)
+                for more in (0.6, 0.9, 1.2):
+                    ring = centre + np.outer(np.cos(turn), place.axes[0]) * (place.md_neck / 2 + 0.5 * more)
+                    ring = ring + np.outer(np.sin(turn), place.axes[1]) * (place.ll_neck / 2 + more)
+                    best = max(best, inside(ring * flip, mesh.vertices, mesh.triangles).mean())
+            assert best >= 0.4, (row, number, best)
+
+
+def test_skull_and_mandible_have_their_features(head):
+    """Free and solid places that a sphere or a tube would not have."""
+    bone, eye = head.skull_landmark_positions(), head.eyes[0].centre
+    skull, mandible, jaw = head.parts["skull"], head.parts["mandible"], head.jaw
+    c = jaw.condyle_l
+    free = [
+        eye + [-8, 22, 2],  # the orbit is deep
+        bone["po_l"] + [0, 1.5, -5],  # ear canal
+        [0, bone["ans"][1] + 8, bone["ans"][2] + 10],  # nasal aperture
+        c,  # the fossa holds the condyle
+        [0, bone["po_l"][1] + 19, -26],  # foramen magnum
+        [0, bone["ans"][1] + 25, bone["ans"][2] - 9],  # under the palate
+    ]
+    assert not inside(np.array(free, float), skull.vertices, skull.triangles).any()
+    solid = [
+        bone["po_l"] + [-5, 15, -16],  # mastoid process
+        bone["ans"] + [0, 6, -1],  # anterior nasal spine
+        c + [1, -12, 4.5],  # articular eminence
+        [0, bone["ans"][1] + 25, bone["ans"][2] - 1],  # palate
+        bone["op"] + [0, -14, -20],  # occipital protuberance
+    ]
+    found = inside(np.array(solid, float), skull.vertices, skull.triangles)
+    assert found.all(), found
+    coronoid = mandible.vertices[(mandible.vertices[:, 1] < c[1] - 20) & (mandible.vertices[:, 2] > c[2] - 12)]
+    assert len(coronoid) > 8  # the coronoid process reaches as high as the joint
+    notch = [[c[0] - 2, c[1] - 14, c[2] - 3]]
+    assert not inside(notch, mandible.vertices, mandible.triangles)[0]  # the notch lies between them
+    front = mandible.vertices[np.abs(mandible.vertices[:, 0]) < 2]
+    assert front[:, 2].max() - front[:, 2].min() > 22  # the body's height in front
 
 
 def test_thicker_tissue_moves_bone_inward(head):

@@ -12,10 +12,9 @@ import re
 import numpy as np
 
 from ...sim.anatomy.head import Eye
-from .mandible import condyle_centre
-from .skull import malar_centre
 from .skull_depth import BoneSpace
 from .skull_field import curve
+from .skull_marks import condyle_centre, malar_centre
 
 _TERM = re.compile(r"([kmesb]:[a-z]+[0-9]*)(?:\*([0-9.]+))?|\(([^()]*)\)")
 _NODE = re.compile(r"m:[a-z]+[0-9]*")

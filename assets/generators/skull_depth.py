@@ -12,7 +12,7 @@ from ...sim.mesh import Mesh, edges, vertex_normals
 from .skull_nets import mirror_index, symmetric
 
 #: Bone stays this far from the lining of mouth, nose and lids, mm.
-CLEARANCE = 1.3
+CLEARANCE = 0.6
 
 #: Thin-skinned places between the landmarks of the table: skin landmarks to average -> mm (estimated).
 _BETWEEN = {
@@ -20,6 +20,10 @@ _BETWEEN = {
     ("ex", "zy"): 7.0, ("tr",): 5.0, ("go", "gn"): 9.5, ("go", "gn", "gn"): 9.0,
     ("se", "al"): 3.0, ("se", "se", "al"): 3.0, ("prn", "en"): 3.0, ("se", "en"): 2.5, ("se", "se", "en"): 2.5,
 }  # fmt: skip
+
+#: The roots of the lower incisors want this much of the tissue's mean depth over the supramentale, mm (under its deviation).
+_LESS = {"sl": 1.8, "id": 2.0}
+_NEARER = {"sl": 1.0}
 
 
 class BoneSpace:
@@ -47,7 +51,7 @@ class BoneSpace:
         self._lining = sampled(vertices, lined, 2.5)[0] if len(lined) else np.zeros((0, 3))
         self._place_targets()
         known = {**skin_counterparts(self.landmarks), **self._extra_counterparts()}
-        spots = [(known[n], table()[_base(n)].mean) for n in known if not n.startswith(("po", "ans"))]
+        spots = [(known[n], table()[_base(n)].mean - _LESS.get(n, 0)) for n in known if not n.startswith(("po", "ans"))]
         for names, depth in _BETWEEN.items():
             for side in ("_l", "_r"):
                 found = [self.landmarks.get(n + side, self.landmarks.get(n)) for n in names]
@@ -75,11 +79,13 @@ class BoneSpace:
                 normal = np.array([np.sign(at[0]), 0.0, 0.0])
             elif name in ("ans", "pr", "id", "sl"):
                 normal = np.array([0.0, -1.0, 0.0])
+            if name == "sl":  # the deepest point of the hollow lies below the roots
+                normal = np.array([0.0, -0.91, 0.41])
             if middle:
                 normal[0], at = 0.0, at * [0, 1, 1]
             normal = normal / np.linalg.norm(normal)
             self.normals[name] = normal
-            self.targets[name] = at - table()[_base(name)].mean * normal
+            self.targets[name] = at - (table()[_base(name)].mean - _NEARER.get(name, 0.0)) * normal
 
     def _bridge(self, at):
         near = np.abs(self.points[:, 0]) < 2
@@ -101,6 +107,26 @@ class BoneSpace:
         below = np.where(clear > 0, distance, -distance)
         return np.maximum(self.depth[near] - below, CLEARANCE - clear)
 
+    def beside(self, yz, deeper=0.0):
+        """(k, 3) the left side of the bone as the skin's depth allows it, ``deeper`` mm more, at places (k, 2) y and z."""
+        yz = np.asarray(yz, float)
+        left = np.flatnonzero(self.points[:, 0] > 20)
+        near = cKDTree(self.points[left, 1:]).query(yz, k=6)[1]
+        best = left[near[np.arange(len(yz)), self.points[left[near], 0].argmax(axis=1)]]
+        x = self.points[best, 0] - (self.depth[best] + deeper) / np.maximum(self.directions[best, 0], 0.5)
+        return np.column_stack([x, yz])
+
+    def before(self, xz, deeper=0.0):
+        """(k,) y of the front of the bone as the skin's depth allows it, ``deeper`` mm more, at places (k, 2) x and z."""
+        xz = np.asarray(xz, float)
+        y = np.arange(self.points[:, 1].min(), -30.0, 2.0)
+        spots = np.stack(np.broadcast_arrays(xz[:, None, 0], y[None], xz[:, None, 1]), axis=-1)
+        free = self.too_shallow(spots.reshape(-1, 3)).reshape(spots.shape[:2]) + np.reshape(deeper, (-1, 1))
+        k = np.maximum((free < 0).argmax(axis=1), 1)
+        row = np.arange(len(xz))
+        a, b = free[row, k - 1], free[row, k]
+        return y[k] - np.clip(b / np.minimum(b - a, -1e-6), 0, 1)
+
     def mouth_limit(self, xy, rise, radius=3.0):
         """(k,) z of the mouth's roof (``rise`` +1) or floor (-1): the farthest lining near places (k, 2) seen from above."""
         level = self.landmarks["sto"][2]
@@ -111,10 +137,18 @@ class BoneSpace:
         found = [tree.query_ball_point(p, radius) or [tree.query(p)[1]] for p in np.asarray(xy)]
         return np.array([rise * (rise * lining[near, 2]).max() for near in found])
 
-    def kept_inside(self, mesh: Mesh, clear=0.9) -> Mesh:
+    def depth_seen(self, points):
+        """(n,) mm to the nearest skin that is seen."""
+        return self._tree.query(points)[0]
+
+    def clearance(self, points):
+        """(n,) mm to the nearest skin or lining, negative where there is air."""
+        return _signed(points, self._all_tree, self._all, self._all_directions)[0]
+
+    def kept_inside(self, mesh: Mesh, clear=0.8) -> Mesh:
         """``mesh`` with vertices that come too near to any skin moved inward."""
         vertices, mirror = mesh.vertices.copy(), mirror_index(mesh.vertices)
-        for _ in range(5):
+        for _ in range(10):
             room, near = _signed(vertices, self._all_tree, self._all, self._all_directions)
             move = np.where(room > -8, np.maximum(clear - room, 0), 0)
             vertices -= move[:, None] * self._all_directions[near]

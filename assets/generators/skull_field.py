@@ -53,13 +53,18 @@ def tube(points, path, radius, flat=None):
     return best
 
 
+#: A plate knows its distance only this near, mm.
+PLATE_REACH = 20.0
+
+
 def plate(samples, thickness):
     """A thick sheet as a function of points: all within ``thickness`` (m,) mm of its sample points (m, 3)."""
     tree = cKDTree(samples)
+    padded = np.append(thickness, 0.0)
 
     def solid(points):
-        distance, near = tree.query(points, k=min(6, len(samples)))
-        return (distance - thickness[near]).min(axis=1)
+        distance, near = tree.query(points, k=min(4, len(samples)), distance_upper_bound=PLATE_REACH)
+        return np.minimum((distance - padded[near]).min(axis=1), PLATE_REACH)
 
     return solid
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""From a distance field to a closed mesh of quads: surface nets on a grid that is fine in the face and coarse behind.
+"""From a distance field to a closed mesh of quads: surface nets on an even grid.
 
 One vertex per sheet of the surface in a grid cell, one quad per crossed grid edge (Gibson 1998); afterwards the vertices
 relax along the surface and are drawn back onto it. The field is symmetric in x and the grid has cells centred on
@@ -18,7 +18,7 @@ from ...sim.mesh import Mesh, edges, vertex_normals
 _CORNERS = np.array([(i, j, k) for i in (0, 1) for j in (0, 1) for k in (0, 1)])
 
 
-def surface_nets(field, low, high, cell, fine=None, growth=12.0, rounds=6) -> Mesh:
+def surface_nets(field, low, high, cell, rounds=4) -> Mesh:
     """The zero surface of ``field`` as a closed, symmetric mesh of quads, facing outward.
 
     Parameters
@@ -26,15 +26,15 @@ def surface_nets(field, low, high, cell, fine=None, growth=12.0, rounds=6) -> Me
     field : function of points (n, 3) mm with x >= 0 -> (n,) mm, negative inside
     low, high : (3,) mm, box that holds the surface
     cell : mm, size of a cell
-    fine : ((low, high) of y, (low, high) of z) mm: outside this band cells grow along that axis, by a factor e
-        each ``growth`` cells; None: nowhere
     rounds : relaxation rounds
     """
-    axes = _axes(np.asarray(low, float), np.asarray(high, float), cell, fine, growth)
+    axes = [np.arange(a, b + cell, cell) for a, b in zip(low, high, strict=True)]
+    axes[0] = (np.arange(int(np.ceil(high[0] / cell)) + 1) + 0.5) * cell
+    axes[0] = np.concatenate([-axes[0][::-1], axes[0]])
     shape = tuple(len(a) for a in axes)
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
     half = shape[0] // 2
-    value = field(grid[half:].reshape(-1, 3)).reshape(half, *shape[1:])
+    value = _sampled(field, grid[half:], cell)
     value = np.concatenate([value[::-1], value])
     value = np.where(np.abs(value) < 1e-6, -1e-6, value)
     for _ in range(12):
@@ -50,23 +50,18 @@ def surface_nets(field, low, high, cell, fine=None, growth=12.0, rounds=6) -> Me
     return _relaxed(_largest(Mesh(vertices, faces)), field, cell, rounds)
 
 
-def _axes(low, high, cell, fine, growth):
-    """Grid planes of each axis; those of x are odd multiples of half a cell."""
-    half = (np.arange(int(np.ceil(high[0] / cell)) + 1) + 0.5) * cell
-    axes = [np.concatenate([-half[::-1], half])]
-    for axis in (1, 2):
-        start, stop = (low[axis] - cell, high[axis] + cell) if fine is None else fine[axis - 1]
-        planes = list(np.arange(start, stop + cell, cell))
-        step = cell
-        while planes[-1] < high[axis] + cell:
-            step *= np.exp(1 / growth)
-            planes.append(planes[-1] + step)
-        step = cell
-        while planes[0] > low[axis] - cell:
-            step *= np.exp(1 / growth)
-            planes.insert(0, planes[0] - step)
-        axes.append(np.array(planes))
-    return axes
+def _sampled(field, grid, cell, stride=3):
+    """Values of ``field`` on a grid (a, b, c, 3): true near the surface, elsewhere those of a coarser grid."""
+    shape = grid.shape[:3]
+    at = [np.unique(np.r_[np.arange(0, n, stride), n - 1]) for n in shape]
+    coarse = grid[np.ix_(*at)]
+    value = field(coarse.reshape(-1, 3)).reshape(coarse.shape[:3])
+    nearest = [np.abs(np.arange(n)[:, None] - a[None]).argmin(axis=1) for n, a in zip(shape, at, strict=True)]
+    index = np.ix_(*nearest)
+    full = value[index]
+    near = np.abs(full) < 1.2 * np.linalg.norm(grid - coarse[index], axis=-1) + 1.8 * cell
+    full[near] = field(grid[near])
+    return full
 
 
 def _quads(value, grid):
@@ -177,13 +172,13 @@ def _relaxed(mesh, field, cell, rounds):
             step -= (step * normal).sum(1, keepdims=True) * normal
             vertices = vertices + 0.5 * step
         for _ in range(1 if turn < rounds else 2):
-            vertices[left] += _towards_surface(field, vertices[left], cell / 3)
+            vertices[left] += towards_surface(field, vertices[left], cell / 3)
             vertices[mirror[left]] = vertices[left] * [-1, 1, 1]
             vertices[left[mirror[left] == left], 0] = 0.0
     return mesh.moved(vertices)
 
 
-def _towards_surface(field, points, limit, step=0.4):
+def towards_surface(field, points, limit, step=0.4):
     """(n, 3) one Newton step along the field's slope, at most ``limit`` mm."""
     value = field(points)
     slope = np.stack([(field(points + step * axis) - value) / step for axis in np.eye(3)], axis=1)

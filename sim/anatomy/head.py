@@ -105,8 +105,8 @@ class Jaw:
     incisor: np.ndarray
     open_max: float = 0.45
     slide_max: float = 8.0
-    side_max: float = 8.0
-    forward_max: float = 7.0
+    side_max: float = 9.0
+    forward_max: float = 8.0
 
 
 #: Radius of limbus and pupil by the globe's: 11.7 mm (Rüfer 2005) and 3.8 mm across in a globe of 24 mm.

@@ -2,17 +2,21 @@
 """The hinge of the jaw: rotation about the axis through both condyles while they slide forward and down the articular
 eminence; protrusion and sideways motion.
 
-Opening begins as rotation and the slide follows (Posselt's border movement: the first third turns almost purely).
+Opening begins as rotation and the slide follows (Posselt's border movement: the first third turns almost purely). To the
+side the jaw turns about the condyle of that side, which stays but for a small shift outward (Bennett), while the other
+one slides forward, down and inward. The wider the mouth, the less is left of either (Posselt's envelope of motion).
 """
 
 import numpy as np
 
 from ..anatomy.head import Jaw
 
-#: The condyle's path runs down the articular eminence, about 35 degrees under the occlusal plane.
-_PATH_SLOPE = np.radians(35.0)
-#: Turn about the vertical for a full sideways motion: the working condyle stays, the other comes forward.
-_SIDE_YAW = np.radians(4.0)
+#: The condyle's path runs down the articular eminence, degrees under the Frankfort horizontal (mean of adults).
+_PATH_SLOPE = np.radians(38.0)
+#: Shift of the working condyle, a share of the whole motion to the side (Bennett).
+_BENNETT = 0.12
+#: From its rest the jaw goes back by this share of what it goes forward: about 1 mm.
+_BACKWARD = 0.12
 
 
 def _rotation(axis: np.ndarray, angle: float) -> np.ndarray:
@@ -21,35 +25,52 @@ def _rotation(axis: np.ndarray, angle: float) -> np.ndarray:
     return np.eye(3) + np.sin(angle) * k + (1 - np.cos(angle)) * (k @ k)
 
 
+def _turn_onto(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """(3, 3) the smallest rotation that takes the direction of ``a`` (3,) to that of ``b`` (3,)."""
+    axis = np.cross(a, b)
+    size = np.linalg.norm(axis)
+    if size < 1e-12:
+        return np.eye(3)
+    return _rotation(axis / size, np.arctan2(size, a @ b))
+
+
 def jaw_transform(jaw: Jaw, opening: float, forward: float = 0.0, side: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
     """Rotation (3, 3) and translation (3,) mm that carry the closed mandible to the position asked for.
 
-    opening 0..1 of ``open_max``; forward -1..1 of ``forward_max``; side -1..1 of ``side_max``, positive to the left.
+    opening 0..1 of ``open_max``; forward -1..1 of ``forward_max``, though backward only a little; side -1..1 of
+    ``side_max``, positive to the left. More than the joint gives is not given.
     """
-    right = jaw.condyle_l - jaw.condyle_r
-    axis = right / np.linalg.norm(right)  # to the subject's left
+    opening, forward, side = np.clip(opening, 0, 1), np.clip(forward, -1, 1), np.clip(side, -1, 1)
+    forward = (forward if forward > 0 else _BACKWARD * forward) * (1 - opening)
+    side = side * np.sqrt(1 - opening**2)
+    across = jaw.condyle_l - jaw.condyle_r
+    width = np.linalg.norm(across)
+    axis = across / width  # to the subject's left
     pivot = (jaw.condyle_l + jaw.condyle_r) / 2
     ahead = jaw.incisor - pivot
     ahead = ahead - (ahead @ axis) * axis
-    # the incisors lie forward and below: level the direction by the axis of the condyles and the vertical
+    # The incisors lie forward and below: level the direction by the axis of the condyles and the vertical.
     up = np.array([0.0, 0.0, 1.0])
     up = up - (up @ axis) * axis
     up /= np.linalg.norm(up)
     front = ahead - (ahead @ up) * up
     front /= np.linalg.norm(front)
-    down_turn = _rotation(axis, float(opening) * jaw.open_max)
-    if (down_turn @ ahead - ahead) @ up > 0:  # opening lowers the incisors, whichever way the axis points
-        down_turn = down_turn.T
-    turn = _rotation(up, float(side) * _SIDE_YAW)
-    if (turn @ ahead - ahead) @ axis * side < 0:
-        turn = turn.T
-    slide = jaw.slide_max * max(0.0, float(opening)) ** 1.5
     path = np.cos(_PATH_SLOPE) * front - np.sin(_PATH_SLOPE) * up
-    yawed = (ahead @ front) * np.sin(abs(side) * _SIDE_YAW)
-    shift = np.sign(side) * max(0.0, abs(side) * jaw.side_max - yawed) * axis
-    shift = shift + slide * path + float(forward) * jaw.forward_max * (np.cos(0.25) * front - np.sin(0.25) * up)
-    rotation = turn @ down_turn
-    return rotation, pivot + shift - rotation @ pivot
+    rotation = _rotation(axis, float(opening) * jaw.open_max)
+    if (rotation @ ahead - ahead) @ up > 0:  # opening lowers the incisors, whichever way the axis points
+        rotation = rotation.T
+    shift = (jaw.slide_max * opening**1.5 + jaw.forward_max * forward) * path
+    translation = pivot + shift - rotation @ pivot
+    if side == 0:
+        return rotation, translation
+    working, other = (jaw.condyle_l, jaw.condyle_r) if side > 0 else (jaw.condyle_r, jaw.condyle_l)
+    bennett = _BENNETT * jaw.side_max * side * axis
+    # What the incisors move aside for each mm the other condyle slides: by the turn about the vertical and by the tilt.
+    lever = ((ahead @ front) * np.cos(_PATH_SLOPE) - (ahead @ up) * np.sin(_PATH_SLOPE)) / width
+    slide = (1 - _BENNETT) * jaw.side_max * abs(side) / lever
+    turn = _turn_onto(other - working, other - working + slide * path)
+    centre = working + shift
+    return turn @ rotation, turn @ (translation - centre) + centre + bennett
 
 
 def opening_mm(jaw: Jaw, opening: float) -> float:

@@ -1,0 +1,135 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The openings of the facial skull: the orbits, deep four-sided cones under a sharp rim, and the nasal aperture."""
+
+import numpy as np
+
+from .skull_field import carve, curve, join, meet, plate, tube
+from .skull_marks import SkullMarks
+
+
+class Orbit:
+    """The left orbit as two fields: its hollow, and the rim that stands round the opening."""
+
+    def __init__(self, marks: SkullMarks):
+        self.apex, rim = marks.apex, marks.rim
+        self.level = rim[:, 1].mean()
+        # The rim's outline as seen from the apex, in polar coordinates.
+        flat = self._seen(rim)
+        self.middle = (flat.min(axis=0) + flat.max(axis=0)) / 2
+        off = flat - self.middle
+        turn = np.arctan2(off[:, 1], off[:, 0])
+        order = np.argsort(turn)
+        turn, radius = turn[order], np.linalg.norm(off, axis=1)[order]
+        self._turn = np.concatenate([turn - 2 * np.pi, turn, turn + 2 * np.pi])
+        self._radius = np.tile(radius, 3)
+        # Thick at the brow, thin at the nose and below.
+        high = np.clip((rim[:, 2] - rim[:, 2].min()) / np.ptp(rim[:, 2]), 0, 1)
+        side = np.clip((rim[:, 0] - rim[:, 0].min()) / np.ptp(rim[:, 0]), 0, 1)
+        thick = 2.0 + 1.7 * high**2 + 1.2 * side**2
+        centre = rim - np.array([self.middle[0], 0, self.middle[1]])
+        away = np.stack([centre[:, 0], 0 * high, centre[:, 2]], axis=1)
+        away /= np.linalg.norm(away, axis=1, keepdims=True)
+        self.rim = plate(rim + away * thick[:, None] * 0.8 + [0, 0.9, 0] * thick[:, None], thick)
+
+    def _taper(self, y):
+        """Width of the cone at a depth against its width at the rim: widest a little behind the rim."""
+        deep = np.clip((y - self.level) / (self.apex[1] - self.level), 0, 0.99)
+        return 1 - deep**1.45
+
+    def _seen(self, p):
+        scale = np.maximum(self._taper(p[:, 1]), 0.05)[:, None]
+        axis = self.apex[[0, 2]]
+        return axis + (p[:, [0, 2]] - axis) / scale
+
+    def hollow(self, p):
+        """(n,) mm, negative within the orbit (and in front of it)."""
+        off = self._seen(p) - self.middle
+        radius = np.interp(np.arctan2(off[:, 1], off[:, 0]), self._turn, self._radius)
+        cone = (np.linalg.norm(off, axis=1) - radius) * np.maximum(self._taper(p[:, 1]), 0.05)
+        return meet(cone, p[:, 1] - self.apex[1] + 3.0, 5)
+
+
+class Nose:
+    """Nasal bones, the pear-shaped aperture with its spine, and the cavity behind."""
+
+    #: Outline of the aperture: share of the way down, half width mm.
+    PEAR = np.array(
+        [(-0.2, -3.0), (0.0, 3.4), (0.12, 5.6), (0.35, 7.6), (0.6, 10.4), (0.8, 12.0), (0.93, 11.6), (1.3, 9)]
+    )
+
+    def __init__(self, space, marks: SkullMarks):
+        at, self.marks, self.space = space.targets, marks, space
+        n, rhi, ans = at["n"], at["rhi"], at["ans"]
+        self.top, self.ans, self.floor = rhi[2], ans, marks.floor
+        rim = marks.rim
+        side = rim[np.r_[88:96, 0:6]].mean(axis=0)
+        # Across: from the bridge down to the medial rim of the orbit; down: from the nasion to the aperture.
+        top, mid = n[2] + 8, rhi[2] + 5
+        rows = [
+            [(0, top), (6, top - 2), (12, top - 5)],
+            [(0, n[2]), (5, n[2] - 1), (side[0] - 1.0, n[2] - 4)],
+            [(0, n[2] - 9), (5, n[2] - 11), (side[0] - 1.0, n[2] - 14)],
+            [(0, mid + 3), (5.5, mid), (14.5, mid - 2)],
+            [(0, rhi[2] + 1), (5.8, rhi[2] - 3), (15, rhi[2] - 5)],
+        ]
+        grid = np.array([curve(np.array(row, float), 16) for row in rows])
+        grid = np.stack([curve(grid[:, k], 24) for k in range(16)], axis=1).reshape(-1, 2)
+        thick = np.tile(np.linspace(2.5, 2.9, 16), 24)
+        self.roof = plate(self._under(grid, thick), thick)
+        # The edge of the aperture, from the nasal bones down to the floor.
+        down = np.linspace(0.1, 1.0, 40)
+        wide = np.interp(down, *self.PEAR.T)
+        z = self.top + down * (self.floor - self.top)
+        thick = np.interp(down, [0, 0.3, 1], [2.6, 2.7, 3.0])
+        edge = [plate(self._under(np.stack([wide + off, z], axis=1), thick), thick) for off in (2.0, 5.0, 8.0)]
+        self.edge = lambda p: join(join(edge[0](p), edge[1](p), 2), edge[2](p), 2)
+
+    def _under(self, xz, thick):
+        """(k, 3) points so deep under the skin that a plate of half thickness ``thick`` (k,) just fits, evened out."""
+        return np.stack([xz[:, 0], self.space.before(xz, thick + 0.2), xz[:, 1]], axis=1)
+
+    def hole(self, p):
+        """(n,) mm, negative in the aperture and in the cavity behind it."""
+        down = (p[:, 2] - self.top) / (self.floor - self.top)
+        wide = np.interp(down, *self.PEAR.T) + np.clip((p[:, 1] - self.ans[1] - 6) * 0.25, 0, 2.0)
+        pear = meet(p[:, 0] - wide, np.maximum(self.floor - p[:, 2], p[:, 2] - self.top - 8), 6.0)
+        return meet(pear, p[:, 1] - (self.ans[1] + 24), 5)
+
+    def cleared(self, bone, p):
+        """``bone`` (n,) with the aperture carved again, and what stands in it."""
+        return join(carve(bone, self.hole(p), 2.2), self.within(p), 2.0)
+
+    def bones(self, p):
+        """(n,) mm, the bones round the aperture."""
+        bone = join(self.roof(p), self.edge(p), 2.5)
+        # Between the orbits: the ethmoid, without its cells.
+        top, bridge = self.marks.rim[:, 2].max(), self.space.targets["n"]
+        slope = np.interp(
+            p[:, 2], [self.top - 2, self.top + 4, bridge[2]], [bridge[1] + 14, bridge[1] + 4, bridge[1] + 3]
+        )
+        core = np.maximum(np.maximum(p[:, 0] - 12, slope - p[:, 1]), np.maximum(p[:, 2] - top, self.top + 3 - p[:, 2]))
+        core = meet(core, p[:, 1] - self.marks.apex[1], 3)
+        return join(bone, core, 3)
+
+    def within(self, p):
+        """(n,) mm, what stands in the opening: the spine at its foot and the septum behind."""
+        a, f = self.ans, self.floor
+        spine = tube(p, [[0, a[1] + 12, f - 3.0], [0, a[1] + 5, f - 1.6], [0, a[1] + 1.8, a[2] + 0.2]], [3.2, 2.8, 1.7])
+        septum = np.abs(p[:, 0]) - 1.7
+        septum = meet(septum, (a[1] + 11 + 0.35 * np.abs(p[:, 2] - (self.top + f) / 2)) - p[:, 1], 1)
+        septum = meet(
+            septum, np.maximum(p[:, 1] - (a[1] + 28), np.maximum(f - 4 - p[:, 2], p[:, 2] - self.top - 10)), 1
+        )
+        return join(spine, septum, 3)
+
+
+def opened(bone, p, orbit: Orbit, nose: Nose):
+    """``bone`` (n,) with rims and nasal bones added, and the openings carved out of it."""
+    hollow = orbit.hollow(p)
+    behind = p[:, 1] - (orbit.level - 4)
+    bone = join(bone, meet(hollow - 5.0, 6 - behind, 4), 3)  # thin walls of its own behind the rim
+    bone = join(bone, orbit.rim(p), 3.0)
+    bone = join(bone, nose.bones(p), 3.0)
+    bone = carve(bone, nose.hole(p), 2.2)
+    bone = carve(bone, hollow, 1.4)
+    return join(bone, nose.within(p), 2.0)
