@@ -145,7 +145,7 @@ class BoneSpace:
         """(n,) mm to the nearest skin or lining, negative where there is air."""
         return _signed(points, self._all_tree, self._all, self._all_directions)[0]
 
-    def kept_inside(self, mesh: Mesh, clear=0.8) -> Mesh:
+    def kept_inside(self, mesh: Mesh, clear=1.2) -> Mesh:
         """``mesh`` with vertices that come too near to any skin moved inward."""
         vertices, mirror = mesh.vertices.copy(), mirror_index(mesh.vertices)
         for _ in range(10):
