@@ -31,11 +31,12 @@ def make_anatomy(skin: Mesh, groups: dict[str, np.ndarray], landmarks: dict[str,
     landmarks : the 60 of `sim.anatomy.landmark_names.SKIN` -> (3,) mm
     """
     from . import eyes, mandible, muscles, skull, teeth, tongue
+    from .bone_cover import covered
 
     yield Progress(0.0, "Skull")
-    cranium = skull.make_skull(skin, groups, landmarks)
+    cranium = covered(skull.make_skull(skin, groups, landmarks), skin, groups["inner"])
     yield Progress(0.4, "Mandible")
-    jaw_bone = mandible.make_mandible(skin, groups, landmarks)
+    jaw_bone = covered(mandible.make_mandible(skin, groups, landmarks), skin, groups["inner"])
     jaw = mandible.make_jaw(skin, groups, landmarks)
     points = skull.make_skull_landmarks(skin, groups, landmarks, cranium, jaw_bone)
     yield Progress(0.6, "Eyes, teeth, tongue")

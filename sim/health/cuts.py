@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 
 from ..anatomy.head import Head
+from ..anatomy.teeth import crowns
 from ..mesh import Mesh
 from ..mesh_piercing import piercings, self_piercings
 from ..mesh_subdivision import smoother
-from .mouth import crowns
 
 #: Parts of which none may cut another. Teeth stand in bone and gums lie on it, so those pairs are no fault.
 APART = (

@@ -2,8 +2,6 @@
 """Teeth, gums and tongue lie in the hollow of the mouth bag, and teeth are rigid."""
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from ..adapt.bone import depth_under
@@ -11,7 +9,7 @@ from ..adapt.closest import Surface
 from ..adapt.thin_plate_spline import similarity
 from ..anatomy.head import Head
 from ..anatomy.inside import winding_number
-from ..mesh import Mesh
+from ..anatomy.teeth import crowns
 
 IN_MOUTH = ("teeth_upper", "teeth_lower", "tongue")
 #: Winding number of the skin one sees above which a place is in the head; closed lips let a little of it escape.
@@ -19,28 +17,6 @@ ENCLOSED = 0.4
 NEAR_LIPS = 3.0  # mm
 DIP = 0.6  # mm
 FLESH = 12.0  # mm: no tooth lies deeper in it
-#: Rings of a tooth, and how many of them are its root.
-ROWS, ROOT_ROWS = 10, 2
-
-
-def crowns(mesh: Mesh) -> np.ndarray:
-    """(n,) bool: vertices of the crowns; all of them for a part without teeth.
-
-    Every tooth is a piece of its own, ring by ring from the tip of its root; roots stand in bone, outside the mouth.
-    """
-    out = np.ones(len(mesh.vertices), dtype=bool)
-    if mesh.material is None or len(np.unique(mesh.material)) < 2:
-        return out
-    enamel = mesh.faces[mesh.material == 0]
-    rows = np.unique(enamel[enamel >= 0])
-    links = np.concatenate([enamel[:, :2], enamel[:, 1:3]])
-    n = len(out)
-    label = connected_components(coo_matrix((np.ones(len(links)), links.T), shape=(n, n)), directed=False)[1][rows]
-    order = np.argsort(label, kind="stable")
-    _, start, count = np.unique(label[order], return_index=True, return_counts=True)
-    place = np.arange(len(rows)) - np.repeat(start, count)
-    out[rows[order]] = place * ROWS >= ROOT_ROWS * np.repeat(count, count)
-    return out
 
 
 def outside_bag(head: Head, part: str) -> int:

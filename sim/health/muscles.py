@@ -6,6 +6,7 @@ import numpy as np
 from ..adapt.bone import depth_under
 from ..adapt.closest import Surface
 from ..anatomy.head import Head
+from ..anatomy.inside import inside
 from .bone import BONES
 
 NEAR = 15.0
@@ -22,10 +23,19 @@ def muscle_room(head: Head) -> dict[str, tuple[float, float]]:
     owner = np.repeat(np.arange(len(head.muscles)), [len(m.shape.vertices) for m in head.muscles])
     depth = depth_under(points, Surface(head.skin.vertices, head.skin.triangles), NEAR)[0]
     out = np.maximum(-depth, 0)
+    out[_all(out > TOUCH, inside, points, head.skin)] = 0
     dip = np.zeros(len(points))
     for part in BONES:
-        bone = Surface(head.parts[part].vertices, head.parts[part].triangles)
-        deep, found = depth_under(points, bone, NEAR)
-        dip = np.maximum(dip, np.where(found.found, deep, 0))
+        mesh = head.parts[part]
+        deep, found = depth_under(points, Surface(mesh.vertices, mesh.triangles), NEAR)
+        deep = np.where(found.found, deep, 0)
+        deep[_all(deep > SLACK, lambda *a: ~inside(*a), points, mesh)] = 0  # round sharp edges normals mislead
+        dip = np.maximum(dip, deep)
     worst = [(float(out[owner == k].max()), float(dip[owner == k].max())) for k in range(len(head.muscles))]
     return {m.name: w for m, w in zip(head.muscles, worst, strict=True) if w[0] > TOUCH or w[1] > SLACK}
+
+
+def _all(rows, test, points, mesh) -> np.ndarray:
+    """Indices of the ``rows`` (k,) bool for which ``test(points, vertices, triangles)`` is true."""
+    rows = np.flatnonzero(rows)
+    return rows[test(points[rows], mesh.vertices, mesh.triangles)]

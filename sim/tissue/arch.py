@@ -11,6 +11,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter, maximum_filter, minimum_filter
 
 from ..anatomy.head import Head
+from ..anatomy.teeth import crowns
 from .layers import Layers
 from .planes import Planes, empty_planes
 
@@ -76,7 +77,8 @@ def build_arches(head: Head, layers: Layers) -> tuple[Arch, ...]:
         mesh = head.parts.get(part)
         if mesh is None or len(mesh.vertices) < 50:
             continue
-        tri = mesh.vertices[mesh.triangles]
+        # roots stand in bone: only what is in the mouth holds lips and cheeks off
+        tri = mesh.vertices[mesh.triangles[crowns(mesh)[mesh.triangles].all(axis=1)]]
         weights = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [0.5, 0.5, 0], [0, 0.5, 0.5], [0.5, 0, 0.5], [1 / 3] * 3])
         points = np.einsum("sk,tkj->tsj", weights, tri).reshape(-1, 3)
         low, high = points.min(axis=0), points.max(axis=0)
