@@ -17,7 +17,7 @@ from .skull_mesh import bone_mesh
 from .teeth_places import ToothPlace, tooth_places
 
 #: Between the incisors of the wide open mouth, mm.
-OPENING = 47.5
+OPENING = 43.0
 
 
 class Mandible:

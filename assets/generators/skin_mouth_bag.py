@@ -10,7 +10,7 @@ from .skin_layout import Layout
 #: middle sideways, the first eight over the mouth, then the corner's meridian, then eight under it. The second ring
 #: runs over the ridges 2.5 mm beyond the teeth's necks, outside of arches 60 mm wide at the molars.
 _UPPER = {
-    8: [(0, 6.8, 13.4), (6, 7.3, 13.4), (12.5, 9.6, 13.4), (18.8, 13.9, 13.2), (24.2, 19.6, 12.8), (28.4, 27.5, 11.6),
+    8: [(0, 6.8, 12.5), (6, 7.3, 12.6), (12.5, 9.6, 12.9), (18.8, 13.9, 13.2), (24.2, 19.6, 12.8), (28.4, 27.5, 11.6),
         (30.5, 35, 9), (33, 39, 4)],
     9: [(0, 13, 11.2), (6.5, 14, 11.2), (11.5, 17, 11.4), (16.5, 22, 12), (20.5, 30, 12.8), (24, 40, 13.3),
         (29.5, 51, 14.8), (34, 56, 8.5)],
