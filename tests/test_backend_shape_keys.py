@@ -82,7 +82,7 @@ def test_a_bake_is_the_simulation(skin, shape_keys, reference_model):
     report = finish(shape_keys.bake_poses(skin, {"grin": pose, "nothing": Pose()}))
     model = reference_model
     truth = solve(model, control(model, pose), max_iterations=shape_keys.ITERATIONS).state.skin
-    np.testing.assert_allclose(bridge.read_positions(skin, "grin"), truth, atol=0.02)
+    np.testing.assert_allclose(bridge.read_positions(skin, "grin"), truth, atol=0.05)
     assert report["grin"].keys() == {"peak_mm", "volume_drift", "penetration_mm", "converged"}
     assert report["grin"]["peak_mm"] > 2 and report["nothing"]["peak_mm"] < 0.1
 

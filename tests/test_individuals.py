@@ -1,13 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Ten random individuals keep every number that the reference keeps."""
 
+import os
+
 import numpy as np
 import pytest
 
 from headshop.sim.health.numbers import LIMITS, numbers
 from headshop.sim.scan.individual import individual
 
-PEOPLE = 10
+#: Ten take two minutes: all of them where CI or HEADSHOP_REBUILD is set.
+PEOPLE = 10 if {"CI", "HEADSHOP_REBUILD"} & set(os.environ) else 3
 
 #: Numbers that these heads do not keep yet.
 NOT_YET = {
@@ -21,6 +24,7 @@ NOT_YET = {
     "muscle out of skin",
     "muscle in bone",
     "lid gap least",
+    "lid gap most",
     "smooth skin self-cuts",
     "skin self-cuts",
     "smooth lid gap least",
