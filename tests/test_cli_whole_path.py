@@ -69,7 +69,7 @@ def test_build(built, reference):
     assert report["landmarks_missing"] == [n for n in reference.landmarks.names if n not in _GIVEN]
     skin = read_ply(built / "skin.ply").vertices
     drawn = smoother(reference.skin.faces, len(skin))[0][: len(skin)] @ reference.skin.vertices
-    assert np.median(np.linalg.norm(skin - drawn, axis=1)) < 1.0
+    assert np.median(np.linalg.norm(skin - drawn, axis=1)) < 1.3
     names = {path.name for path in built.iterdir()}
     assert "shapes.npz" not in names and not any(name.startswith(".") or name.endswith("blend1") for name in names)
 
