@@ -7,6 +7,7 @@ import pytest
 from headshop.sim.anatomy.head import MATERIALS
 from headshop.sim.anatomy.inside import inside, winding_number
 from headshop.sim.anatomy.storage import load_head
+from headshop.sim.health.topology import closed, volume
 
 
 @pytest.fixture(scope="module")
@@ -17,18 +18,6 @@ def head():
 def outer_skin(head):
     """Triangles of the skin without the lining of mouth, nose and lids."""
     return head.skin.triangles[head.groups["inner"][head.skin.triangles].max(axis=1) < 0.5]
-
-
-def closed(mesh):
-    t = mesh.triangles
-    directed = np.concatenate([t[:, [0, 1]], t[:, [1, 2]], t[:, [2, 0]]])
-    forth = np.unique(directed, axis=0)
-    return len(forth) == len(directed) and np.array_equal(forth, np.unique(directed[:, ::-1], axis=0))
-
-
-def volume(mesh):
-    corner = mesh.vertices[mesh.triangles] - mesh.vertices.mean(axis=0)
-    return np.einsum("ij,ij->", corner[:, 0], np.cross(corner[:, 1], corner[:, 2])) / 6
 
 
 @pytest.mark.parametrize("part", ["eye_l", "eye_r"])

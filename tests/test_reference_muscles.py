@@ -14,6 +14,7 @@ from headshop.sim.anatomy.muscle_room import Room
 from headshop.sim.anatomy.muscle_shape import frames, muscle_shape, muscle_sheet, recentred, reshaped
 from headshop.sim.anatomy.storage import load_head
 from headshop.sim.anatomy.tissue_depth import TABLE
+from headshop.sim.health.topology import closed, volume
 from headshop.sim.tissue.muscle_field import _arc
 
 KNOT = ("zygomaticus_major", "levator_anguli_oris", "risorius", "buccinator", "depressor_anguli_oris")
@@ -46,18 +47,6 @@ def left(head):
 
 def base(name):
     return name.removesuffix("_l").removesuffix("_r")
-
-
-def closed(mesh):
-    t = mesh.triangles
-    directed = np.concatenate([t[:, [0, 1]], t[:, [1, 2]], t[:, [2, 0]]])
-    forth = np.unique(directed, axis=0)
-    return len(forth) == len(directed) and np.array_equal(forth, np.unique(directed[:, ::-1], axis=0))
-
-
-def volume(mesh):
-    corner = mesh.vertices[mesh.triangles] - mesh.vertices.mean(axis=0)
-    return np.einsum("ij,ij->", corner[:, 0], np.cross(corner[:, 1], corner[:, 2])) / 6
 
 
 def of_whom(bad, owner, some):

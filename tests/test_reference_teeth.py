@@ -16,6 +16,7 @@ from headshop.assets.generators.teeth_sizes import LOWER, UPPER
 from headshop.sim.anatomy.head import MATERIALS
 from headshop.sim.anatomy.inside import inside, winding_number
 from headshop.sim.anatomy.storage import load_head
+from headshop.sim.health.topology import closed, volume
 from headshop.sim.mesh import Mesh
 
 ROWS = {"teeth_upper": ("upper", UPPER), "teeth_lower": ("lower", LOWER)}
@@ -50,18 +51,6 @@ def pieces(mesh, material):
         new[mine] = np.arange(len(mine))
         found.append(Mesh(mesh.vertices[mine], new[faces[label[faces[:, 0]] == k]]))
     return found
-
-
-def closed(mesh):
-    t = mesh.triangles
-    directed = np.concatenate([t[:, [0, 1]], t[:, [1, 2]], t[:, [2, 0]]])
-    forth = np.unique(directed, axis=0)
-    return len(forth) == len(directed) and np.array_equal(forth, np.unique(directed[:, ::-1], axis=0))
-
-
-def volume(mesh):
-    corner = mesh.vertices[mesh.triangles] - mesh.vertices.mean(axis=0)
-    return np.einsum("ij,ij->", corner[:, 0], np.cross(corner[:, 1], corner[:, 2])) / 6
 
 
 def crown(tooth_piece, place):
