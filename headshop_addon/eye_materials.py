@@ -40,6 +40,25 @@ def _polar(graph: Graph):
     return graph.vector("LENGTH", flat), graph.vector("NORMALIZE", flat), pupil
 
 
+def _wet(graph: Graph, colour, rough: float, depth, film) -> None:
+    """Flesh under a film of tears. depth : subsurface weight, radius, scale (m); film : weight, roughness."""
+    shader = graph.node(
+        "BsdfPrincipled",
+        {
+            "Base Color": colour,
+            "Roughness": rough,
+            "Subsurface Weight": depth[0],
+            "Subsurface Radius": depth[1],
+            "Subsurface Scale": depth[2],
+            "Coat Weight": film[0],
+            "Coat Roughness": film[1],
+            "Coat IOR": 1.34,
+        },
+        subsurface_method="BURLEY",
+    )
+    graph.surface(shader.outputs[0])
+
+
 def _sclera(graph: Graph) -> None:
     radius, angle, _ = _polar(graph)
     # Veins run towards the iris and thin out before it: noise that is fine around the eye and slow along it.
@@ -51,21 +70,7 @@ def _sclera(graph: Graph) -> None:
     white = graph.mix(graph.smooth(radius, 1.2, 2.4), (0.80, 0.775, 0.74), (0.74, 0.60, 0.55))
     colour = graph.mix(vein, white, (0.50, 0.10, 0.08))
     colour = graph.mix(graph.smooth(radius, 0.98, 1.13, 0.75, 0.0), colour, (0.20, 0.185, 0.18))  # the limbus is soft
-    shader = graph.node(
-        "BsdfPrincipled",
-        {
-            "Base Color": colour,
-            "Roughness": 0.35,
-            "Subsurface Weight": 0.5,
-            "Subsurface Radius": (1.0, 0.6, 0.45),
-            "Subsurface Scale": 0.0015,
-            "Coat Weight": 0.9,
-            "Coat Roughness": 0.07,
-            "Coat IOR": 1.34,
-        },
-        subsurface_method="BURLEY",
-    )
-    graph.surface(shader.outputs[0])
+    _wet(graph, colour, rough=0.35, depth=(0.5, (1.0, 0.6, 0.45), 0.0015), film=(0.9, 0.07))
 
 
 def _iris(graph: Graph) -> None:
@@ -107,21 +112,7 @@ def _pupil(graph: Graph) -> None:
 
 def _caruncle(graph: Graph) -> None:
     """Wet pink flesh."""
-    shader = graph.node(
-        "BsdfPrincipled",
-        {
-            "Base Color": (0.56, 0.22, 0.19, 1.0),
-            "Roughness": 0.4,
-            "Subsurface Weight": 0.6,
-            "Subsurface Radius": (1.0, 0.35, 0.25),
-            "Subsurface Scale": 0.0012,
-            "Coat Weight": 0.8,
-            "Coat Roughness": 0.1,
-            "Coat IOR": 1.34,
-        },
-        subsurface_method="BURLEY",
-    )
-    graph.surface(shader.outputs[0])
+    _wet(graph, (0.56, 0.22, 0.19, 1.0), rough=0.4, depth=(0.6, (1.0, 0.35, 0.25), 0.0012), film=(0.8, 0.1))
 
 
 def _cornea(graph: Graph) -> None:

@@ -12,6 +12,7 @@ from scipy.ndimage import gaussian_filter1d
 
 from ...sim.mesh import vertex_normals
 from .mouth_room import MouthRoom
+from .skin_curves import unit
 from .teeth_shape import tooth_points
 
 #: Margin of the gum: mm toward the crown from the neck at the middle of a tooth, and at the papilla's tip.
@@ -83,7 +84,6 @@ def _end(place, last):
 def _between(a, b):
     """The section half way between two."""
     mean = [(np.asarray(x) + np.asarray(y)) / 2 for x, y in zip(a, b, strict=True)]
-    unit = lambda v: v / np.linalg.norm(v)  # noqa: E731
     return Section(mean[0], unit(mean[1]), unit(mean[2]), mean[3], mean[4], float(mean[5]), float(mean[6]))
 
 

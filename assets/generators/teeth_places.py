@@ -152,9 +152,9 @@ def _row(teeth, shape, front, up, edges):
         before = Touch(places[-1:]) if places else None
         if before is None:
             # the middle incisors touch their own mirror images
-            way = -first_touch(lambda w: Touch([place(-w)], mirrored=True).gap(place(-w)), -1.0, 0.5)  # noqa: B023
+            way = -first_touch(lambda w: Touch([place(-w)], mirrored=True).gap(place(-w)), -1.0, 0.5)  # noqa: B023 (used at once)
         else:
-            way = start - first_touch(lambda w: before.gap(place(start - w)), -1.2, 1.0)  # noqa: B023
+            way = start - first_touch(lambda w: before.gap(place(start - w)), -1.2, 1.0)  # noqa: B023 (used at once)
         places.append(place(way))
         start = line.end(way, tooth.md)
     return places
