@@ -8,7 +8,7 @@ from scipy.spatial import ConvexHull
 from headshop.sim.adapt.closest import Surface, weld
 from headshop.sim.adapt.feature_mesh import describe, flip_edges, place, subdivide
 from headshop.sim.adapt.refine import sampling_sites, scattered, thinned
-from headshop.sim.adapt.triangle_projection import closest_on_triangles
+from headshop.sim.triangle_projection import closest_on_triangles
 
 
 def ball(radius=100.0, count=3000, seed=0):

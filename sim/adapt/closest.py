@@ -13,7 +13,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from ..mesh import vertex_normals
-from .triangle_projection import closest_on_triangles
+from ..triangle_projection import closest_on_triangles
 
 SAMPLES = 160_000  # a finer cover does not pay for the time its tree takes
 

@@ -4,8 +4,8 @@
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..adapt.triangle_projection import closest_on_triangles
 from ..mesh import Mesh, vertex_normals
+from ..triangle_projection import closest_on_triangles
 
 #: mm between the points a surface is sampled by.
 SPACING = 1.6

@@ -11,13 +11,13 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..adapt.triangle_projection import closest_on_triangles
 from ..anatomy.head import Head, moved_muscles_and_jaw
 from ..anatomy.storage import load_head, write_atomically
 from ..errors import InputError
 from ..mesh import Mesh, vertex_normals
 from ..mesh_subdivision import smoother
 from ..progress import Progress, Work, portion
+from ..triangle_projection import closest_on_triangles
 from .individual import individual
 from .noise import Noise
 from .ply import write_ply
