@@ -14,7 +14,7 @@ from headshop.sim.anatomy.head import PARTS, SKIN_GROUPS
 from headshop.sim.anatomy.landmark_names import SKIN, SKULL, mirrored
 from headshop.sim.anatomy.storage import load_head
 from headshop.sim.mesh import edges, vertex_normals
-from headshop.sim.mesh_subdivision import subdivision
+from headshop.sim.mesh_subdivision import drawn, subdivision
 
 
 @pytest.fixture(scope="module")
@@ -282,7 +282,7 @@ def test_texture_is_dense_on_the_face(head):
 
 
 def test_measurements_are_those_of_an_adult(head):
-    at = head.landmark_positions()
+    at = head.landmarks.on({"skin": drawn(head.skin.faces, head.skin.vertices)})
     scores = {n.name: n.score(at) for n in norms()}
     assert len(scores) >= 40
     assert max(abs(s) for s in scores.values()) <= 2.0, scores

@@ -14,6 +14,7 @@ import numpy as np
 from ...sim.adapt.thin_plate_spline import similarity
 from ...sim.anatomy.head import SurfacePoints
 from ...sim.mesh import Mesh
+from ...sim.mesh_subdivision import drawn
 from .skin import make_skin
 from .skin_bust import bust_columns, place_bust
 from .skin_fit import fit_skin, outer_skin
@@ -94,7 +95,7 @@ def mean_head(folder: Path) -> tuple[np.ndarray, dict[str, np.ndarray]]:
         fits = [(subject, *fit_skin(layout, mean, own, subject)) for subject in heads(folder)]
         mean = _frankfurt(_average(layout, fits, mean), points)
     mean = _lower_vault(mean, points.on({"skin": mean})["n"][2] - 5)
-    mean = toward_norms(mean, points)
+    mean = toward_norms(layout.faces, mean, points)
     mean = _frankfurt(0.5 * (mean + mean[layout.mirror] * [-1, 1, 1]), points)
     at = points.on({"skin": mean})
     seeds = {name: at[name + "_l"] for name in TOUCHED}
@@ -116,7 +117,8 @@ def main(argv: list[str]) -> int:
         seeds=np.array(list(seeds.values()), dtype=np.float32),
         sources=np.array([f"{name}: {share}" for name, share in SHARES.items()]),
     )
-    at = make_skin().landmarks.on({"skin": make_skin().mesh.vertices})
+    skin = make_skin()
+    at = skin.landmarks.on({"skin": drawn(skin.mesh.faces, skin.mesh.vertices)})
     for norm in norms():
         print(f"{norm.name:28s}{norm.measure(at):8.1f}{norm.mean:8.1f} +- {norm.sd:4.1f}{norm.score(at):7.2f}")
     return 0

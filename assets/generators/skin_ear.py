@@ -20,6 +20,9 @@ SIZE = 0.975
 #: How far (mm) the plane of the auricle passes outside the tragion.
 STAND = 5.0
 
+#: Ring 1, the back of the auricle: index -> how far (mm) it stands off the head at least, for a groove behind the ear.
+_GROOVE = {11: 2.6, 12: 3.2, 13: 4.0, 14: 4.4, 15: 4.6, 16: 4.6, 17: 4.4, 18: 4.0, 19: 3.0, 20: 2.0, 21: 1.0}
+
 #: How much of what subdivision rounds off the cage of rings 1.. gives back at each step.
 _CRISP = (0.0, 0.7, 0.8, 0.45, 0.6, 0.0, 0.0)
 
@@ -98,8 +101,13 @@ def _sculpt(layout: Layout, x: np.ndarray, side: Side) -> tuple[np.ndarray, np.n
         if k == 1:
             for i, (y, z, high) in BEFORE.items():
                 knots[i] = tuple(axes @ (side(np.array([[y, z]]))[0] + [high, 0, 0] - origin) / SIZE**2)
+        at = origin + contour(knots, size) @ axes
+        if k == 1:
+            back = list(_GROOVE)
+            lack = list(_GROOVE.values()) - (at - side(at[:, 1:]))[back, 0]
+            at[back, 0] += np.maximum(lack, 0)
         index.append(ring[k])
-        target.append(origin + contour(knots, size) @ axes)
+        target.append(at)
     index.append(patch[1:-1, 1])
     target.append(origin + np.array([MIDDLE[row] for row in sorted(MIDDLE)]) @ axes)
     return np.concatenate(index), np.concatenate(target)

@@ -5,7 +5,6 @@ import numpy as np
 
 from ...sim.anatomy.head import SurfacePoints
 from ...sim.anatomy.landmark_names import SKIN
-from ...sim.mesh_subdivision import limit
 from .skin_layout import Layout
 
 #: Landmarks that are vertices of the layout: grid (u, v) or (hole, ring, index), left side.
@@ -21,6 +20,7 @@ PLACES = {
     "ps": ("eye_l", 5, 20),
     "pi": ("eye_l", 5, 8),
     "ch": ("mouth", 3, 19),
+    "al": (4, 14),
 }
 
 
@@ -127,8 +127,6 @@ def skin_landmarks(
     found["sl"] = f.extreme(np.r_[mouth[1:3, 11], f.front[22:24]], lambda p: p[:, 1])
     found["pg"] = f.apex(f.front[22:26], lambda p: -p[:, 1])
     found["gn"] = f.place((0, 25))
-    smooth = limit(layout.faces, layout.count)
-    found["al"] = f.near(smooth[layout.grid[14, 4]] @ vertices)  # the wing's cage stands far off what is seen
     found["sbal"] = f.near(0.5 * (vertices[layout.grid[15, 2]] + vertices[layout.grid[15, 3]]))
     grid = layout.grid
     found["eu"] = f.extreme(grid[0:7, 12:20].ravel(), lambda p: p[:, 0])

@@ -9,6 +9,7 @@ import numpy as np
 
 from ...sim.anatomy.head import SurfacePoints
 from ...sim.anatomy.landmark_names import SKIN, mirrored
+from ...sim.mesh_subdivision import drawn
 
 TABLE = Path(__file__).resolve().parents[1] / "tables" / "measurements_25y.csv"
 
@@ -61,12 +62,14 @@ def _kernel(a, b):
     return 1.3**2 * np.exp(-squared / (2 * 30.0**2)) + 8.0**2 * np.exp(-squared / (2 * 140.0**2))
 
 
-def toward_norms(vertices: np.ndarray, landmarks: SurfacePoints, rounds: int = 6) -> np.ndarray:
+def toward_norms(faces: np.ndarray, vertices: np.ndarray, landmarks: SurfacePoints, rounds: int = 6) -> np.ndarray:
     """(n, 3) mm: the smoothest symmetric change of a head that brings its measurements within their usual spread.
+
+    The measurements are those of the surface drawn of the mesh (``faces`` (m, 4), ``vertices`` (n, 3) mm).
 
     Gauss-Newton on the sum of squared scores with a Gaussian process prior on the landmarks' displacements.
     """
-    found = landmarks.on({"skin": vertices})
+    found = landmarks.on({"skin": drawn(faces, vertices)})
     at = np.array([found[n] for n in SKIN])
     partner = [SKIN.index(mirrored(n)) for n in SKIN]
     used = [n for n in norms() if n.name not in LEFT_ALONE]
