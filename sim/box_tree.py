@@ -17,7 +17,7 @@ class BoxTree:
         low, high = np.asarray(low, dtype=float), np.asarray(high, dtype=float)
         self.count = len(low)
         self.depth = max(int(np.ceil(np.log2(max(self.count, 1)))), 0)
-        self.order = np.argsort(_morton((low + high) / 2), kind="stable")
+        self.order = np.argsort(morton((low + high) / 2), kind="stable")
         size = 1 << self.depth
         # Level d holds 2**d boxes; what the last level has too many is empty (low > high) and overlaps nothing.
         bottom_low, bottom_high = np.full((size, 3), np.inf), np.full((size, 3), -np.inf)
@@ -66,8 +66,8 @@ class BoxTree:
         return (np.minimum(first, second), np.maximum(first, second)) if same else (first, second)
 
 
-def _morton(points):
-    """(n,) int64: the bits of x, y and z in turn, 1024 steps along the longest side."""
+def morton(points):
+    """(n,) int64 for points (n, 3): the bits of x, y and z in turn, 1024 steps along the longest side."""
     span = max(float(np.ptp(points, axis=0).max()), 1e-12)
     cell = ((points - points.min(axis=0)) / span * 1023).astype(np.int64)
     code = np.zeros(len(points), dtype=np.int64)

@@ -56,6 +56,20 @@ def test_winding_number_of_a_cube():
     np.testing.assert_allclose(flipped, -found, atol=1e-9)
 
 
+def test_far_triangles_counted_in_groups_give_the_same_answer(head):
+    mesh = head.skin  # open below
+    some = np.random.default_rng(3)
+    points = np.concatenate(
+        [
+            some.uniform(mesh.vertices.min(axis=0) - 15, mesh.vertices.max(axis=0) + 5, (900, 3)),
+            mesh.vertices[::40] + some.normal(0, 1.0, mesh.vertices[::40].shape),
+        ]
+    )
+    exact = winding_number(points, mesh.vertices, mesh.triangles)
+    assert (np.abs(exact - 0.5) < 0.3).any(), "some are hard to tell"
+    np.testing.assert_array_equal(inside(points, mesh.vertices, mesh.triangles), exact > 0.5)
+
+
 def test_winding_number_forgives_a_hole():
     open_cube = CUBE.triangles[:-2]
     assert inside([(0.3, 0.5, 0.5)], CUBE.vertices, open_cube)[0]

@@ -4,7 +4,7 @@
 import numpy as np
 from scipy.sparse import csr_matrix, identity, vstack
 
-from ..anatomy.inside import winding_number
+from ..anatomy.inside import inside
 from ..anatomy.tissue_depth import skull_targets
 from ..mesh import Mesh
 from .closest import Surface
@@ -29,7 +29,7 @@ def depth_under(points, skin: Surface, reach: float = np.inf):
     rise = np.einsum("ij,ij->i", points[near] - found.points[near], found.normals[near])
     out = rise > 0
     unsure = np.flatnonzero(np.abs(rise) < 0.7 * found.distance[near])
-    out[unsure] = winding_number(points[near[unsure]], skin.vertices, skin.triangles) < 0.5
+    out[unsure] = ~inside(points[near[unsure]], skin.vertices, skin.triangles)
     depth[near[out]] *= -1
     return depth, found
 
