@@ -34,7 +34,7 @@ _LINING = (0.0, 0.36, 0.70, 0.92, 1.0, 1.0, 1.0, 1.0, 1.0)
 
 #: How far the rings round the mouth follow the lips (the rest follows the cheek), and those inside follow the lining.
 _FOLLOW = {0: 0.12, 1: 0.45, 2: 0.8, 3: 1.0, 4: 1.0, 5: 1.0, 6: 1.0, 7: 1.0}
-_INSIDE = {8: 0.5, 9: 1.0, 10: 1.0}
+_INSIDE = {8: 0.5, 9: 1.0, 10: 1.0, 11: 1.0}
 
 
 def _ease(t):

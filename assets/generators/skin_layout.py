@@ -29,7 +29,8 @@ CROWN = 8
 class Block:
     """Cells removed between columns u0..u1 and rows v0..v1, the rings that refill them, and the final patch.
 
-    ``patch`` = (first ring vertex, cells down, cells across) of the grid that closes the last ring.
+    ``patch`` = (first ring vertex, cells down, cells across) of the grid that closes the last ring. The vertices of ring
+    ``late`` are numbered after all others: tables made before there was this ring keep their order.
     """
 
     u0: int
@@ -38,6 +39,7 @@ class Block:
     v1: int
     rings: int
     patch: tuple[int, int, int]
+    late: int | None = None
 
     @property
     def perimeter(self) -> list[tuple[int, int]]:
@@ -51,7 +53,7 @@ class Block:
 
 #: Blocks of the midline and of the left side (the right side mirrors them).
 BLOCKS = {
-    "mouth": Block(-5, 5, 16, 22, 10, (2, 2, 14)),
+    "mouth": Block(-5, 5, 16, 22, 11, (2, 2, 14), late=10),
     "eye": Block(3, 11, 5, 9, 8, (1, 2, 10)),
     "nostril": Block(1, 3, 13, 15, 3, (0, 2, 2)),
     "ear": Block(15, 19, 7, 15, 7, (-1, 10, 2)),
@@ -177,20 +179,27 @@ class _Maker:
         return self.table(CROWN + 1, CROWN + 1, border)
 
     def mouth(self, block: Block, grid: np.ndarray):
-        """Rings and patch of a block on the midline."""
+        """Rings and patch of a block on the midline; the late ring's vertices are still to be made (-1)."""
         around, size = block.perimeter, len(block.perimeter)
-        other = [(2 * (block.v1 - block.v0) + block.u1 - block.u0 - i) % size for i in range(size)]
         levels = np.full((block.rings + 1, size), -1, dtype=np.int32)
         levels[0] = [grid[v, u % (2 * HALF)] for u, v in around]
         for ring in range(1, block.rings + 1):
-            for i in range(size):
-                if around[i][0] == 0:
-                    levels[ring, i] = self.single()
-                elif around[i][0] > 0:
-                    levels[ring, i], levels[ring, other[i]] = self.pair()
+            if ring != block.late:
+                levels[ring] = self.ring(block)
         start, down, across = block.patch
         border = {s: levels[-1, (start + i) % size] for i, s in enumerate(_perimeter_of(down, across))}
         return levels, self.table(down + 1, across + 1, border)
+
+    def ring(self, block: Block) -> np.ndarray:
+        """One ring of a block on the midline."""
+        around, size = block.perimeter, len(block.perimeter)
+        out = np.empty(size, dtype=np.int32)
+        for i, (u, _) in enumerate(around):
+            if u == 0:
+                out[i] = self.single()
+            elif u > 0:
+                out[i], out[(2 * (block.v1 - block.v0) + block.u1 - block.u0 - i) % size] = self.pair()
+        return out
 
     def both(self, block: Block, grid: np.ndarray):
         """Rings (2, r, k) and patches (2, ...) of a block of the left side and its mirror image."""
@@ -251,6 +260,8 @@ def skin_layout() -> Layout:
             levels, fill = make.both(block, grid)
             for side, s in enumerate(("_l", "_r")):
                 rings[name + s], patches[name + s] = levels[side], fill[side]
+    rings["mouth"][BLOCKS["mouth"].late] = make.ring(BLOCKS["mouth"])
+    for name in BLOCKS:
         left = name if name == "mouth" else name + "_l"
         closed = np.concatenate([rings[left], rings[left][:, :1]], axis=1)
         quads = np.stack([closed[:-1, :-1], closed[:-1, 1:], closed[1:, 1:], closed[1:, :-1]], axis=-1).reshape(-1, 4)

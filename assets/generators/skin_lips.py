@@ -103,7 +103,7 @@ def place_lips(layout, x, head):
     x[ring[6]] = meet
     x[ring[7]] = meet * [0.97, 1, 1] + [0, 3.5, 0]
     # a plain sack for now: the lips' finishing gives it its shape once the teeth's room is known
-    for k, (size, back) in ((8, (1.2, 12.0)), (9, (1.3, 30.0)), (10, (1.1, 48.0))):
+    for k, (size, back) in ((8, (1.2, 12.0)), (9, (1.3, 24.0)), (10, (1.2, 36.0)), (11, (1.1, 48.0))):
         x[ring[k]] = meet * [size, 1, 1] + np.stack([0 * above, 0 * above + back, above * np.minimum(away, 4) * 2.5], 1)
     patch = layout.patches["mouth"]
     x[patch[1, 1:-1]] = 0.5 * (x[patch[0, 1:-1]] + x[patch[2, 1:-1]]) + [0, 2, 0]

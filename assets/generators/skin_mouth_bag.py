@@ -1,58 +1,88 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The lining of the mouth as the mucosa runs: deep between lips and gums, over the ridges, to palate and floor."""
+"""The lining of the mouth as the mucosa runs: a slit between lips and gums, over the alveolar ridges, to palate and floor.
+
+Ring 8 is the fornix of the vestibule, 9 and 10 are the outer and the inner line of the teeth's necks, so that between
+them the lining rides over the ridge; 11 lies on the palate and on the floor. Behind the last molars the ridges of both
+jaws meet in the fold between them (raphe).
+"""
 
 import numpy as np
 
 from ...sim.mesh_subdivision import limit
 from .skin_layout import Layout
+from .skin_lips import lip_places
+from .teeth_places import neck_line, tooth_rows
 
 #: Where the limit surface lies, (x, behind, above) mm against the middle of the line where the lips meet; from the
-#: middle sideways, the first eight over the mouth, then the corner's meridian, then eight under it. The second ring
-#: runs over the ridges 2.5 mm beyond the teeth's necks, outside of arches 60 mm wide at the molars.
+#: middle sideways, eight over the mouth, then the corner's meridian, then eight under it.
 _UPPER = {
-    8: [(0, 6.8, 12.5), (6, 7.3, 12.6), (12.5, 9.6, 12.9), (18.8, 13.9, 13.2), (24.2, 19.6, 12.8), (28.4, 27.5, 11.6),
-        (30.5, 35, 9), (33, 39, 4)],
-    9: [(0, 13, 11.2), (6.5, 14, 11.2), (11.5, 17, 11.4), (16.5, 22, 12), (20.5, 30, 12.8), (24, 40, 13.3),
-        (29.5, 51, 14.8), (34, 56, 8.5)],
-    10: [(0, 32, 15), (5, 33, 15), (9.5, 36, 14.8), (13, 40, 14.6), (16.5, 46, 14.4), (20.5, 52.5, 14.6), (26, 60, 13.2),
-         (29.8, 62.5, 7)],
+    8: [(0, 6.0, 14.5), (5, 6.3, 14.5), (10, 7.5, 14.7), (15.8, 10.5, 14.9), (22, 15.5, 14.9), (27.8, 22.8, 14.2),
+        (31.3, 32, 12), (33.4, 40.5, 6.5)],
+    11: [(0, 31, 18.5), (4.5, 32, 18.5), (8.0, 35, 18.5), (11, 39, 18.5), (13.4, 44, 18.5), (15.2, 50.5, 18), (17, 57.5, 16),
+         (19.5, 66, 10)],
 }  # fmt: skip
-_CORNER = {8: (33.5, 38, -2.8), 9: (34.5, 56, 0.5), 10: (30, 62.5, 0.5)}
+_CORNER = {8: (33.8, 42.5, -0.5), 9: (32.5, 64.5, 3), 10: (28.5, 70, 3), 11: (24, 71.5, 2)}
 _LOWER = {
-    8: [(0, 9.8, -13.2), (6, 10.5, -13.4), (12, 13.8, -13.6), (18, 19, -13.2), (23.5, 26, -12), (27.5, 32, -10.8),
-        (31, 37, -9), (33, 39.5, -6)],
-    9: [(0, 15.5, -10.8), (6.5, 16.5, -11), (12, 19.5, -11.8), (17, 24, -10), (21, 33, -8.3), (24.5, 43, -6.7),
-        (29, 52, -5.2), (33.5, 56, -3.3)],
-    10: [(0, 32, -15.6), (5, 33, -15.6), (9.5, 36, -15.6), (13, 41, -15.4), (16, 46.5, -14.8), (19.5, 52, -13.5),
-         (25, 59, -9), (29.5, 62, -4.5)],
+    8: [(0, 9.4, -14.2), (5, 9.7, -14.4), (10, 11.0, -14.6), (15.6, 14.0, -14.2), (21.6, 19.0, -13), (26.8, 25.4, -11.6),
+        (31.5, 33, -9.8), (34, 40, -6)],
+    11: [(0, 31, -17), (4.5, 32, -17), (8.5, 35, -17), (11.5, 40, -16.6), (13.6, 45.5, -16), (15.2, 52, -14.5),
+         (17, 59, -12), (19, 67, -6)],
 }  # fmt: skip
 
+#: Way along the necks from the midline to the points of rings 9 and 10, as a share of that to the last molar, and the
+#: last point's way behind that molar's neck, mm.
+_ALONG, _PAST = (0.0, 0.095, 0.19, 0.295, 0.42, 0.575, 0.78), (4.0, 3.7)
+
+#: mm by which the lining stands off the teeth's necks: outward and inward; and toward the roots, above and below.
+_STAND, _APICAL = (
+    0.9,
+    (np.array([1.9, 1.7, 1.7, 1.5, 1.3, 1.3, 1.3, 4.0]), np.array([1.3, 1.3, 2.2, 1.8, 1.3, 1.3, 1.3, 1.0])),
+)
+
+#: The same more on the inner side.
+_INNER = 0.5
+
+#: How much the cage keeps to the places wanted of the limit surface, by steps from the middle to the corner: free of
+#: this it would swing and cut itself.
+_STIFF = np.array([0.3, 0.3, 0.3, 0.3, 0.3, 0.3, 0.6, 2.0, 2.0])
+
 #: mm behind the line: the middle of the back wall.
-_BACK = 67.0
+_BACK = 72.5
+
+_FLIP = np.array([-1.0, 1.0, 1.0])
 
 
 def mouth_bag(layout: Layout, x: np.ndarray) -> None:
-    """Rings 8 to 10 of the mouth and the patch that closes it, behind lips already finished."""
+    """Rings 8 to 11 of the mouth and the patch that closes it, behind lips already finished."""
     ring, patch = layout.rings["mouth"], layout.patches["mouth"]
     line = 0.5 * (x[ring[6][27]] + x[ring[6][11]])
-    targets = []
-    for k, upper in _UPPER.items():
+    rows = tooth_rows(x[ring[6][27]])
+    necks = [_necks(rows[name], _PAST[k], _APICAL[k], line) for k, name in enumerate(("upper", "lower"))]
+    upper, lower = ({**fixed, 9: near[0], 10: near[1]} for fixed, near in zip((_UPPER, _LOWER), necks, strict=True))
+    places, wanted = [], []
+    for k in (8, 9, 10, 11):
         around = np.empty((32, 3))
-        for step, (above, below) in enumerate(zip(upper, _LOWER[k], strict=True)):
+        for step, (above, below) in enumerate(zip(upper[k], lower[k], strict=True)):
             around[27 - step], around[11 + step] = above, below
             around[(27 + step) % 32], around[11 - step] = above * _FLIP, below * _FLIP
         around[19], around[3] = _CORNER[k], _CORNER[k] * _FLIP
-        targets.append((ring[k], line + around))
-    back = 0.5 * (targets[-1][1][(np.arange(21, 34) % 32)[::-1]] + targets[-1][1][np.arange(5, 18)])
+        places.append(ring[k])
+        wanted.append(line + around)
+    back = 0.5 * (wanted[-1][(np.arange(21, 34) % 32)[::-1]] + wanted[-1][np.arange(5, 18)])
     back[:, 1:] = line[1:] + np.stack([_BACK - 1.5 * (back[:, 0] / 26) ** 2, np.zeros(13)], axis=1)
-    targets.append((patch[1, 1:-1], back))
-    for vertices, place in targets:
-        x[vertices] = place
-    smooth = limit(layout.faces, layout.count)
-    for _ in range(4):
-        now = smooth @ x
-        for vertices, place in targets:
-            x[vertices] += 0.8 * (place - now[vertices])
+    rows, target = np.concatenate([*places, patch[1, 1:-1]]), np.concatenate([*wanted, back])
+    x[rows] = target
+    smooth = limit(layout.faces, layout.count)[rows]
+    inner = smooth[:, rows].toarray()
+    stiff = np.append(np.tile(_STIFF[8 - lip_places()[1]], 4), np.full(13, _STIFF[0]))
+    x[rows] += np.linalg.solve(inner.T @ inner + np.diag(stiff), inner.T @ (target - smooth @ x))
 
 
-_FLIP = np.array([-1.0, 1.0, 1.0])
+def _necks(places, past, apical, line):
+    """(2, 8, 3) mm against the line: points outside and inside of the necks of a row's left half."""
+    out = []
+    for way, down in ((1, apical), (-1, apical + _INNER)):
+        points = neck_line(places, np.array(_ALONG), past, way, _STAND, down[:, None])
+        points[0, 0] = 0.0
+        out.append(points - line)
+    return np.array(out)

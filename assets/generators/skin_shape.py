@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .skin_layout import skin_layout
+from .skin_layout import BLOCKS, skin_layout
 
 #: (k, 3) float32 mm for the left side and the midline of the layout; sources are named in the file.
 MEAN_HEAD = Path(__file__).resolve().parents[1] / "tables" / "mean_head.npz"
@@ -22,9 +22,19 @@ def both_sides(left: np.ndarray) -> np.ndarray:
 
 
 def mean_shape() -> np.ndarray:
-    """(n, 3) mm, the mean of the heads measured; `skin_finish.finish_shape` makes the reference skin of it."""
+    """(n, 3) mm, the mean of the heads measured; `skin_finish.finish_shape` makes the reference skin of it.
+
+    The late ring of the mouth, which no scan shows, is put half way between its neighbours.
+    """
+    layout = skin_layout()
     with np.load(MEAN_HEAD) as file:
-        return both_sides(file["left"].astype(np.float64))
+        known = file["left"].astype(np.float64)
+    left = np.zeros((len(layout.left), 3))
+    left[: len(known)] = known[: len(left)]
+    x = both_sides(left)
+    ring, late = layout.rings["mouth"], BLOCKS["mouth"].late
+    x[ring[late]] = 0.5 * (x[ring[late - 1]] + x[ring[late + 1]])
+    return x
 
 
 def landmark_seeds() -> dict[str, np.ndarray]:

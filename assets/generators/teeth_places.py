@@ -17,7 +17,7 @@ from .teeth_sizes import LOWER, UPPER, Tooth
 #: The line through the contact points: half width and depth mm, and exponent (see `arch`).
 UPPER_ARCH, LOWER_ARCH = (26.3, 57.0, 0.43), (23.5, 54.0, 0.37)
 #: The lower incisors' edges rise over those of the upper and stand behind them, mm.
-OVERBITE, OVERJET = 2.4, 2.0
+OVERBITE, OVERJET = 2.4, 2.7
 #: Height of the biting edge toward the other row, against the incisors', mm: canine tip, then the curve of Spee. The
 #: lower back teeth start from here and rise or fall until they meet the upper ones.
 _EDGE = {-1: (0, -0.5, 0.1, -0.6, -0.8, -0.8, -1.1, -1.6), +1: (0, 0.0, 0.2, -0.9, -1.3, -1.5, -1.2, -0.6)}
@@ -102,8 +102,35 @@ def tooth_places(skin: Mesh, groups: dict[str, np.ndarray], landmarks: dict[str,
     ----------
     skin, groups, landmarks : as `make_anatomy` has them
     """
-    front = np.array([0.0, landmarks["sto"][1] + BEHIND_LIPS, landmarks["sto"][2] - SHOW])
+    return tooth_rows(landmarks["sto"])
+
+
+def tooth_rows(stomion: np.ndarray) -> dict:
+    """`tooth_places` behind lips whose line has its middle at ``stomion`` (3,) mm."""
+    front = np.array([0.0, stomion[1] + BEHIND_LIPS, stomion[2] - SHOW])
     return {row: [p._replace(neck=p.neck + front) for p in places] for row, places in _rows().items()}
+
+
+def neck_line(places: list, shares: np.ndarray, past: float, way: int, stand: float, apical: np.ndarray) -> np.ndarray:
+    """(k + 1, 3) mm on a line outside (``way`` +1) or inside (-1) of the necks of a row's left half.
+
+    shares : (k,) of the way from the midline to the last molar, measured through the middles of the necks
+    past : mm from that molar's neck to the last point
+    stand, apical : mm off the necks' faces, and, (k + 1, 1), from the necks toward the roots
+    """
+    neck, axis = np.array([p.neck for p in places]), np.array([p.axis for p in places])
+    face = neck + [way * (p.ll_neck / 2 + stand) * p.axes[1] for p in places]
+    path = np.concatenate([neck[:1] * [-1, 1, 1], neck])
+    at = np.append(0, np.cumsum(np.linalg.norm(np.diff(path[:, :2], axis=0), axis=1)))
+    at -= at[1] / 2
+    along = np.append(shares * at[-1], at[-1])
+    flip = np.array([-1.0, 1, 1])
+    points, down = (
+        np.stack([np.interp(along, at, c) for c in np.concatenate([line[:1] * flip, line]).T], axis=1)
+        for line in (face, axis)
+    )
+    points[-1] += (places[-1].md_neck / 2 + past) * places[-1].axes[0]
+    return points + apical * down
 
 
 @cache
