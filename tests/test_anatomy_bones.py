@@ -150,7 +150,7 @@ def test_jaw_opens_in_its_joint(head):
     jaw, mandible = head.jaw, head.parts["mandible"]
     np.testing.assert_allclose(jaw.condyle_l * [-1, 1, 1], jaw.condyle_r, atol=1e-6)
     assert inside([jaw.condyle_l, jaw.condyle_r], mandible.vertices, mandible.triangles).all()
-    assert 40 < opening_mm(jaw, 1.0) < 50
+    assert 45 < opening_mm(jaw, 1.0) < 50
     assert opening_mm(jaw, 1.3) == opening_mm(jaw, 1.0)
     rotation, translation = jaw_transform(jaw, 1.0)
     incisor = rotation @ jaw.incisor + translation

@@ -104,7 +104,7 @@ class Jaw:
     condyle_r: np.ndarray
     incisor: np.ndarray
     open_max: float = 0.45
-    slide_max: float = 9.0
+    slide_max: float = 11.9
     side_max: float = 9.0
     forward_max: float = 8.0
 

@@ -59,7 +59,7 @@ def jaw_transform(jaw: Jaw, opening: float, forward: float = 0.0, side: float = 
     rotation = _rotation(axis, float(opening) * jaw.open_max)
     if (rotation @ ahead - ahead) @ up > 0:  # opening lowers the incisors, whichever way the axis points
         rotation = rotation.T
-    shift = (jaw.slide_max * opening**1.5 + jaw.forward_max * forward) * path
+    shift = (jaw.slide_max * opening**1.7 + jaw.forward_max * forward) * path
     translation = pivot + shift - rotation @ pivot
     if side == 0:
         return rotation, translation
