@@ -1,12 +1,23 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Neck and bust: what muscles, larynx and collar bones show under the skin."""
+"""Neck and bust: its posture and length, and what muscles, larynx and collar bones show under the skin."""
 
 import numpy as np
 
 from ...sim.adapt.closest import Surface
 from ...sim.mesh import Mesh, vertex_normals
+from .skin_bust import bust_columns
 from .skin_layout import Layout
 from .skin_shape import both_sides
+
+#: The heads that were measured stoop a little. How far the lower neck comes forward and goes down, and the throat goes
+#: back, mm; how much broader the neck is, a share.
+_FORWARD, _DOWN, _THROAT_BACK, _BROADER = 6.0, 12.0, 7.0, 0.05
+
+#: The share of that way down that the shoulder does not go.
+_SHOULDER_STAYS = 0.8
+
+#: mm by which the bust goes on beyond what was measured: at the front, the shoulder and the back.
+_BUST_LONGER = (10.0, 20.0, 14.0)
 
 #: Line on the left side or the midline (x, y, z mm), how far the skin stands out along it, how broad that is (sigma).
 #: The lines follow the bones they are named after and the muscle from mastoid to breastbone; all are put on the skin.
@@ -24,6 +35,40 @@ BRUSHES = (
 )
 
 
+def _ease(t):
+    t = np.clip(t, 0, 1)
+    return t * t * (3 - 2 * t)
+
+
+def _upright(points: np.ndarray) -> np.ndarray:
+    """(n, 3) mm: points of head and neck where they are when the neck stands more upright under the head."""
+    x, y, z = points.T
+    height = z - 0.286 * (y - 6)  # over a plane through collar bones and the seventh vertebra of the neck
+    low = _ease((-98 - height) / 62)
+    throat = np.exp(-(((z + 111) / 15) ** 2) / 2 - (x / 34) ** 2 / 2) * _ease((y + 56) / 24) * _ease((40 - y) / 60)
+    neck = _ease((-72 - height) / 30) * _ease((-height + 215) / 60 - 0.25)
+    wider = _BROADER * neck * _ease((-128 - z) / -30) + 0.0
+    out = points.copy()
+    out[:, 0] += wider * x
+    out[:, 1] += _THROAT_BACK * throat - _FORWARD * low
+    out[:, 2] -= _DOWN * low * (1 - _SHOULDER_STAYS * _ease((abs(x) - 38) / 45))
+    return out
+
+
+def _longer_bust(layout: Layout, x: np.ndarray) -> None:
+    """The rows of the bust spread over more of the shoulders (left side and midline)."""
+    columns = bust_columns(layout)[:, 2:]
+    more = np.interp(np.arange(len(columns)), [0, 8, 16], _BUST_LONGER)
+    for column, extra in zip(columns, more, strict=True):
+        path = x[column]
+        ahead = path[-1] - path[-2]
+        ahead[2] *= 0.6 if abs(ahead[0]) > 3 else 1.0
+        path = np.concatenate([path, path[-1:] + extra * ahead / np.linalg.norm(ahead)])
+        length = np.r_[0, np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))]
+        at = length[:-1] * length[-1] / length[-2]
+        x[column] = np.stack([np.interp(at, length, path[:, k]) for k in range(3)], axis=1)
+
+
 def _to_line(points: np.ndarray, line: np.ndarray) -> np.ndarray:
     """(n,) mm from points (n, 3) to a polyline (k, 3)."""
     if len(line) == 1:
@@ -35,13 +80,15 @@ def _to_line(points: np.ndarray, line: np.ndarray) -> np.ndarray:
 
 
 def finish_neck(layout: Layout, x: np.ndarray) -> None:
-    """Stroke the brushes over the neck, along the skin's normals; the open edge stays (left side)."""
+    """Set the neck upright and the bust longer, then stroke the brushes over them, along the skin's normals (left side)."""
+    x[:] = _upright(x)
+    _longer_bust(layout, x)
     whole = both_sides(x[layout.left])
     triangles = Mesh(whole, layout.faces).triangles
     skin, normal = Surface(whole, triangles), vertex_normals(whole, triangles)
     out = np.zeros(layout.count)
     for _, line, height, sigma in BRUSHES:
-        on_skin = skin.closest(np.array(line, float)).points
+        on_skin = skin.closest(_upright(np.array(line, float))).points
         out += height * np.exp(-((_to_line(whole, on_skin) / sigma) ** 2) / 2)
     inside = np.concatenate([rings.ravel() for rings in layout.rings.values()])
     out[inside] = 0
