@@ -15,9 +15,13 @@ from .skin_lips import lip_places
 #: Opening of the lips by steps from the corner to the middle, 1 = all: an ellipse.
 _OVAL = (0.0, 0.47, 0.66, 0.78, 0.87, 0.935, 0.975, 0.994, 1.0)
 
-#: The same in the lining: on the rings of the ridges, which go with their bones, and of the fornix before them.
-_LINING = {8: (0.0, 0.42, 0.68, 0.85, 0.93, 0.97, 0.99, 1.0, 1.0)}
-_RIDGE = (0.0, *(1.0,) * 8)
+#: The same in the lining: in the fornix, on the ridges, which go with their bones, and on palate and floor behind.
+_LINING = {
+    8: (0.0, 0.42, 0.68, 0.85, 0.93, 0.97, 0.99, 1.0, 1.0),
+    9: (0.0, 0.6, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0),
+    10: (0.0, 0.6, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0),
+    11: (0.0, 0.4, 0.8, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0),
+}
 
 #: Chin: rows, and the last column that still goes with the bone in each.
 _CHIN = ((22, 3), (23, 4), (24, 4), (25, 2))
@@ -73,6 +77,6 @@ def jaw_weights(p, vertices: np.ndarray) -> np.ndarray:
     out = _outside(p, lips)
     out[ring[3:8]] = lips
     for k in range(8, len(ring)):
-        out[ring[k]] = 0.5 - 0.5 * above * np.array(_LINING.get(k, _RIDGE))[away]
+        out[ring[k]] = 0.5 - 0.5 * above * np.array(_LINING[k])[away]
     out[patch[1, 1:-1]] = 0.5
     return out
