@@ -3,9 +3,11 @@
 
 import numpy as np
 
+from ...sim.adapt.lid_contact import BACK, LidContact
 from ...sim.anatomy.eyeball import reach
+from ...sim.mesh import Mesh
 from ...sim.mesh_subdivision import limit
-from .eye_frame import BALL, GAP, RADIUS
+from .eye_frame import BALL, GAP, RADIUS, eye_frames
 from .skin_curves import even, lerp, unit
 from .skin_layout import Layout
 
@@ -49,10 +51,10 @@ def place_lids(layout, x, head):
 UPPER_EDGE = [
     (-14.4, -2.3),
     (-12.3, -0.6),
-    (-8.8, 2.0),
-    (-4.6, 3.7),
-    (-0.6, 4.15),
-    (4.0, 3.6),
+    (-8.8, 2.1),
+    (-4.6, 3.85),
+    (-0.6, 4.35),
+    (4.0, 3.8),
     (8.0, 2.1),
     (12.3, -0.6),
 ]
@@ -98,31 +100,28 @@ def finish_lids(layout: Layout, x: np.ndarray) -> None:
     patch = layout.patches["eye_l"]
     x[patch[1, 1:-1]] = back + centre
     smooth = limit(layout.faces, layout.count)
-    front, on_ball = ring[2:7].ravel(), ring[6][inner >= 3]
+    front = ring[2:7].ravel()
     want = np.concatenate([goal[k] for k in range(2, 7)]) + centre
     firm = (
         np.array([0.5, 0.8, 0.8, 0.75, 0.9])[:, None] * np.clip((np.minimum(inner, outer) - 0.4) / 2.6, 0, 1)
     ).reshape(-1, 1)
     rows = smooth[front]
-    behind = np.unique(np.concatenate([ring[7], ring[8], patch[1, 1:-1]]))
-    room = np.where(np.isin(behind, ring[7]), 0.4, 0.75)
-    lining, margin = smooth[behind], smooth[on_ball]
     for _ in range(24):
         x[front] += firm * (want - rows @ x) + 0.08 * (want - x[front])
-        # cage and limit of the inner edge lie on either side of a quarter of a millimetre from the ball
-        edge = margin @ x - centre
-        stand = np.linalg.norm(edge, axis=1) - np.linalg.norm(_clear(edge, 0, 0), axis=1)
-        least = np.clip(0.46 - stand, 0.03, 0.43)
-        x[on_ball] = _clear(x[on_ball] - centre, least, least) + centre
-        away = lining @ x - centre
-        x[behind] += _clear(away, room, np.inf) - away
+    contact = _contact(layout, ring[6][(inner >= 3) & (outer >= 1)])
+    for _ in range(3):  # the ball goes where the lids are, the lids where the ball is
+        x[:] = contact.settled(x, eye_frames(x)[0])
 
 
-def _clear(points: np.ndarray, least, most) -> np.ndarray:
-    """Points (k, 3) mm about the eye's centre, ``least`` to ``most`` mm in front of its surface."""
-    far = np.linalg.norm(points, axis=1)
-    surface = reach(BALL, np.arccos(np.clip(-points[:, 1] / far, -1, 1)))
-    return points * (np.clip(far, surface + least, surface + most) / far)[:, None]
+def _contact(layout: Layout, edge) -> LidContact:
+    """The left lids as they settle on their ball, margins and backs rather than the seen skin."""
+    ring, patch = layout.rings["eye_l"], layout.patches["eye_l"]
+    stiff = np.full(layout.count, np.inf)
+    for k, hardness in ((4, 16.0), (5, 2.0), (6, BACK), (7, BACK), (8, BACK)):
+        stiff[ring[k]] = hardness
+    stiff[patch[1, 1:-1]] = BACK
+    triangles = Mesh(np.zeros((layout.count, 3)), layout.faces).triangles
+    return LidContact(layout.faces, triangles, layout.count, stiff, edge)
 
 
 def _eye_centre(margin: np.ndarray) -> np.ndarray:

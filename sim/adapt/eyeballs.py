@@ -4,18 +4,25 @@
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.spatial import cKDTree
 
-from ..anatomy.caruncle import caruncle_vertices
-from ..anatomy.eyeball import BALL, reach
+from ..anatomy.eyeball import BALL
 from ..anatomy.head import Eye, Head
-from .thin_plate_spline import similarity
+from ..mesh import Mesh
+from .flesh import cleared
+from .lid_contact import BACK, SEEN, LidContact, height_over
+from .refine import thinned
+from .thin_plate_spline import System, similarity
 
 if TYPE_CHECKING:
     from .rest import Rest
 
 SMALLEST, LARGEST = 9.5, 13.0  # mm: from a child of one year to a large adult eye
+LIES = (0.18, 0.94)  # along an eye from its inner corner: where the inner edge of the lids lies on the ball
 CORNERS, FADE = (0.06, 1.12), 0.12  # along an eye from its inner corner: where lids lie on the ball; fading in and out
 BESIDE = (0.7, 0.35)  # how much of that holds for the seen lid one and two edges beside the rim
+CLOSE = 0.5  # share of the reference's room around the caruncle that is enough
+AROUND_CARUNCLE = 4.0  # mm: lids and eyeball this near carry it
 OUTSIDE = 0.8  # mm of lid between eyeball and seen skin, at least, where the reference has as much
 
 
@@ -70,16 +77,23 @@ def eye_similarity(old: Eye, new: Eye, turn):
     return lambda points: (points - old.centre) @ turn.T * (new.radius / old.radius) + new.centre
 
 
-def eye_part(vertices, carried, eye: Eye, corner) -> np.ndarray:
-    """The eye part (n, 3): the ball as ``carried`` takes it, the caruncle in the inner ``corner`` (3,) of the lids."""
-    return np.concatenate([carried(vertices[:BALL]), caruncle_vertices(eye, corner)])
+def eye_part(rest: "Rest", side: str, skin, carried, eye: Eye) -> np.ndarray:
+    """The eye part (n, 3) mm: the ball as ``carried`` takes it, the caruncle as ball and lids around it go.
 
-
-def height_over(points, eye: Eye, profile) -> np.ndarray:
-    """(k,) mm from the eyeball out to points (k, 3), along the ray from its centre; ``profile`` as of `profile_of`."""
-    away = points - eye.centre
-    length = np.linalg.norm(away, axis=1)
-    return length - profile(np.arccos(np.clip(away @ eye.gaze / np.maximum(length, 1e-9), -1, 1)))
+    skin : (n, 3) mm, the fitted head's, with the lids in their places
+    """
+    part = rest.head.parts[f"eye_{side}"]
+    vertices = part.vertices
+    flesh, start = vertices[BALL:], rest.head.skin.vertices
+    near = cKDTree(flesh)
+    lids = np.flatnonzero((rest.lids(side) > 0) & (near.query(start)[0] < AROUND_CARUNCLE))
+    ball = np.flatnonzero(near.query(vertices[:BALL])[0] < AROUND_CARUNCLE)
+    source = np.concatenate([start[lids], vertices[ball]])
+    keep = thinned(source, 0.2)
+    space = System(source[keep], 0.0).solve(np.concatenate([skin[lids], carried(vertices[ball])])[keep])
+    faces = part.faces[part.faces.min(axis=1) >= BALL] - BALL
+    moved = cleared(Mesh(space.transform(flesh), faces), rest.head.skin.moved(skin), eye, CLOSE)
+    return np.concatenate([carried(vertices[:BALL]), moved])
 
 
 def lids_on_eye(rest: "Rest", skin, eye: Eye, side: str) -> np.ndarray:
@@ -90,16 +104,15 @@ def lids_on_eye(rest: "Rest", skin, eye: Eye, side: str) -> np.ndarray:
     """
     head = rest.head
     old = head.eyes["lr".index(side)]
-    profile = profile_of(old)
     lid = rest.lids(side) > 0.05
     start = head.skin.vertices
-    height = height_over(start, old, profile)
+    height = height_over(start, old)
     front = (start - old.centre) @ old.gaze > 0
     rows = np.flatnonzero(lid & front & (height < 0.4 * old.radius))
     if len(rows) == 0:
         return skin
     grow = eye.radius / old.radius
-    now = height_over(skin[rows], eye, profile_of(eye))
+    now = height_over(skin[rows], eye)
     near = (rest.inner | rest.rim).astype(float)
     for share in BESIDE:
         near = np.maximum(near, share * (rest.link @ near > 0.99 * near[near > 0].min()))
@@ -120,15 +133,35 @@ def lids_on_eye(rest: "Rest", skin, eye: Eye, side: str) -> np.ndarray:
     return out
 
 
-def _between_corners(head: Head, points, side: str):
-    """(k,) 1 between the corners of the eye, where lids lie on the ball, 0 at them."""
+def lid_contact(rest: "Rest", side: str) -> LidContact:
+    """The lids of the reference's eye ``side`` as `LidContact` moves them."""
+    head = rest.head
+    lid = rest.lids(side) > 0.05
+    stiff = np.full(len(lid), np.inf)
+    reached = np.zeros(len(lid), dtype=bool)
+    reached[rest.organs[f"eye_{side}"]] = True
+    reached |= rest.rim & lid
+    stiff[reached] = BACK
+    for hardness in SEEN:
+        grown = (reached | (rest.link @ reached.astype(float) > 0)) & (lid | reached)
+        stiff[grown & ~reached] = hardness
+        reached = grown
+    share = _along(head, head.skin.vertices, side)
+    edge = np.flatnonzero(rest.rim & (rest.lids(side) > 0.3) & (share > LIES[0]) & (share < LIES[1]))
+    contact = LidContact(head.skin.faces, head.skin.triangles, len(lid), stiff, edge)
+    contact.allow(head.skin.vertices, head.eyes["lr".index(side)])
+    return contact
+
+
+def _along(head: Head, points, side: str):
+    """(k,) from 0 at the inner corner of the eye to 1 at the outer one."""
     marks = head.landmark_positions()
     inner, outer = marks[f"en_{side}"], marks[f"ex_{side}"]
-    share = (points - inner) @ (outer - inner) / ((outer - inner) @ (outer - inner))
+    return (points - inner) @ (outer - inner) / ((outer - inner) @ (outer - inner))
+
+
+def _between_corners(head: Head, points, side: str):
+    """(k,) 1 between the corners of the eye, where lids lie on the ball, 0 at them."""
+    share = _along(head, points, side)
     ends = np.minimum((share - CORNERS[0]) / FADE, (CORNERS[1] - share) / FADE)
     return np.clip(ends, 0, 1)
-
-
-def profile_of(eye: Eye):
-    """Callable: angle from the gaze (rad) -> how far the eyeball reaches there (mm); the cornea stands out."""
-    return lambda angle: reach(eye, angle)

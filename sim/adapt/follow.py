@@ -83,11 +83,13 @@ def follow(reference: Head, skin: np.ndarray, unseen: np.ndarray | None = None) 
     lining = np.maximum(group(reference, "lip_upper"), group(reference, "lip_lower")) > 0.3
     shut = rest.rim & lining  # where lips meet is seen, a fold behind them is not
     final = restored(rest, final, unseen, scale)
-    parts["skin"] = final = untangled(rest, final, seen & ~unseen, shut)
-    corners = reference.landmarks.on({"skin": final})
+    final = untangled(rest, final, seen & ~unseen, shut)
+    for eye, side in zip(eyes, "lr", strict=True):
+        final = rest.contacts[side].settled(final, eye)
+    parts["skin"] = final
     for eye, side in zip(eyes, "lr", strict=True):
         part = f"eye_{side}"
-        parts[part] = eyeballs.eye_part(reference.parts[part].vertices, carried[part], eye, corners[f"en_{side}"])
+        parts[part] = eyeballs.eye_part(rest, side, final, carried[part], eye)
 
     yield Progress(0.5, "Bone under the skin")
     surface = Surface(drawn(reference.skin.faces, final), reference.skin.triangles)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How the parts of the reference head lie to each other: what following a warped skin needs to know, found once."""
 
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 from scipy.sparse import coo_matrix
@@ -13,6 +13,8 @@ from ..mesh import edges
 from ..mesh_subdivision import drawn
 from . import bone
 from .closest import Surface
+from .eyeballs import lid_contact
+from .lid_contact import LidContact
 from .openings import rims
 from .refine import scattered, thinned
 from .skin_fit import group
@@ -101,6 +103,11 @@ class Rest:
     def lids(self, side: str) -> np.ndarray:
         """(n,) weights of both lids of the eye ``side``."""
         return np.maximum(group(self.head, f"lid_upper_{side}"), group(self.head, f"lid_lower_{side}"))
+
+    @cached_property
+    def contacts(self) -> dict[str, LidContact]:
+        """Side -> how the lids of that eye are brought to lie on an eyeball."""
+        return {side: lid_contact(self, side) for side in "lr"}
 
     def _lip_pairs(self):
         skin = self.head.skin.vertices

@@ -1,74 +1,83 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The lacrimal caruncle and the semilunar fold: the pink flesh in the inner corner of the eye.
+"""The lacrimal caruncle and the semilunar fold: the pink flesh that fills the inner corner of the eye.
 
-They belong to the eye part but stay with the lids when the ball turns. The caruncle is about 5 mm high and 3 mm broad
-(anatomy texts); the fold is the crescent between it and the white.
+One pillow between the lids: a mound near the corner, about 5 mm long and 3 mm broad (anatomy texts), which passes into a
+crescent that lies on the white and is open toward the iris. It belongs to the eye part but stays with the lids when the
+ball turns; its rim is tucked in behind the edges of the lids.
 """
 
 import numpy as np
 
 from ..mesh import Mesh
-from .eyeball import flipped, lathe_faces
+from .eyeball import reach
 from .head import Eye
 
-_AROUND, _RINGS = 12, 6
-#: Caruncle: (from the corner toward the eye, behind the corner, up) and its half sizes the same way, mm.
-_PLACE, _SIZE = (3.65, 1.8, 0.1), (1.65, 1.15, 1.1)
-#: Semilunar fold: angle from the caruncle along the ball, rad; half sizes (along, off the ball, up), mm.
-_FOLD, _FOLD_SIZE = 0.05, (0.9, 0.3, 1.5)
+#: Steps from the corner to the ball and from the lower lid to the upper.
+ALONG, ACROSS = 12, 9
+#: The flesh begins and ends at these shares of the way from the corner outward.
+START, END = 0.12, 0.86
+#: The rim keeps this far from the lids and the whole this far from the ball, mm.
+FREE, CLEAR = 0.3, 0.14
+#: Mound: place along the way, half length, height in mm. Crescent: the same, and how far it is open toward the iris, mm.
+MOUND, FOLD, BOW = (0.46, 0.26, 0.95), (0.9, 0.1, 0.25), 0.9
+#: Thickness of the flesh, mm.
+THICK = 0.4
 
 
-def caruncle(eye: Eye, corner: np.ndarray) -> Mesh:
-    """Two closed pieces, mm, for the inner corner (3,) of the lids; mirrored eyes give mirrored meshes."""
-    return Mesh(caruncle_vertices(eye, corner), _faces(_is_right(eye, corner)))
+def caruncle(eye: Eye, lower: np.ndarray, upper: np.ndarray) -> Mesh:
+    """The closed pillow, mm, between the backs of the lids.
+
+    eye : the eyeball it lies beside
+    lower, upper : (k, 3) mm, the lids' backs behind their edges, both from the inner corner of the eye outward
+    """
+    u, v = np.meshgrid(np.linspace(0, 1, ALONG), np.linspace(-1, 1, ACROSS), indexing="ij")
+    low, high = (_curve(points, START + (END - START) * u[:, 0]) for points in (lower, upper))
+    apart = high - low
+    wide = np.linalg.norm(apart, axis=1, keepdims=True)
+    inset = np.minimum(FREE * (0.8 + 0.7 * u[:, :1]) / np.maximum(wide, 1e-9), 0.35)
+    low, high = low + inset * apart, high - inset * apart
+    front = low[:, None] + 0.5 * (v + 1)[..., None] * (high - low)[:, None]
+    corner = 0.5 * (lower[0] + upper[0])
+    outward = 0.5 * (low[-1] + high[-1]) - corner
+    outward -= (outward @ eye.gaze) * eye.gaze
+    outward /= np.linalg.norm(outward)
+    front = front - (BOW * u**2 * (1 - v**2))[..., None] * outward
+    rim = (1 - v**4) * np.clip(4 * u, 0, 1) * np.clip(6 * (1 - u), 0, 1)
+    back = _off(front - (THICK * rim)[..., None] * eye.gaze, eye, CLEAR)
+    mound = MOUND[2] * np.exp(-(((u - MOUND[0]) / MOUND[1]) ** 2)) * (1 - v**2) ** 1.4
+    fold = FOLD[2] * np.exp(-(((u - FOLD[0]) / FOLD[1]) ** 2)) * (1 - v**2) ** 0.5
+    ray = front - eye.centre
+    ray /= np.linalg.norm(ray, axis=-1, keepdims=True)
+    toward = eye.gaze + (u**2)[..., None] * (ray - eye.gaze)
+    front = front + ((mound + fold) * rim)[..., None] * toward
+    front = _off(front, eye, CLEAR + 0.22 * rim)
+    whole = np.concatenate([front.reshape(-1, 3), back[1:-1, 1:-1].reshape(-1, 3)])
+    faces = _faces()
+    right = float(outward @ np.cross(eye.gaze, [0.0, 0.0, 1.0])) > 0
+    return Mesh(whole, faces[:, ::-1].copy() if right else faces)
 
 
-def caruncle_vertices(eye: Eye, corner: np.ndarray) -> np.ndarray:
-    """(k, 3) mm: the vertices of `caruncle`, scaled with the eyeball and clear of it."""
-    size = eye.radius / 12.0
-    away = corner - eye.centre
-    nasal = away - (away @ eye.gaze) * eye.gaze
-    nasal /= np.linalg.norm(nasal)
-    up = np.cross(eye.gaze, nasal) * (1.0 if _is_right(eye, corner) else -1.0)
-    frame = np.stack([-nasal, -eye.gaze, up])
-    middle = corner + size * np.array(_PLACE) @ frame
-    body = _egg() * (size * np.array(_SIZE))
-    body[:, 0] *= 1 - 0.12 * _egg()[:, 2] ** 2
-    body[:, 2] *= 1 - 0.25 * np.clip(-_egg()[:, 0], 0, 1)  # it narrows toward the corner
-    first = middle + body @ frame
-    # the fold lies on the ball, a crescent that is open toward the iris
-    toward = middle - eye.centre
-    polar = np.arctan2(toward @ nasal, toward @ eye.gaze) - _FOLD
-    lift = eye.radius + size * (0.25 + _FOLD_SIZE[1])
-    egg = _egg() * (size * np.array(_FOLD_SIZE))
-    bow = (egg[:, 2] / (size * _FOLD_SIZE[2])) ** 2
-    angle = polar - (egg[:, 0] * (1 - 0.5 * bow) - 0.25 * size * bow) / eye.radius
-    height = toward @ up + 0.1 * size + egg[:, 2]
-    radius = np.sqrt(np.maximum((lift + egg[:, 1]) ** 2 - height**2, 1.0))
-    second = (
-        eye.centre
-        + (radius * np.sin(angle))[:, None] * nasal
-        + (radius * np.cos(angle))[:, None] * eye.gaze
-        + height[:, None] * up
-    )
-    return np.concatenate([first, second])
+def _curve(points, at):
+    """(len(at), 3) along a polyline through ``points`` (k, 3), ``at`` 0..1 of its steps."""
+    step = np.linspace(0, 1, len(points))
+    return np.stack([np.interp(at, step, points[:, k]) for k in range(3)], axis=1)
 
 
-def _is_right(eye, corner):
-    up = np.array([0.0, 0.0, 1.0])
-    return float((corner - eye.centre) @ np.cross(eye.gaze, up)) < 0
+def _off(points, eye, least):
+    """Points (..., 3) mm at least ``least`` mm over the ball."""
+    away = points - eye.centre
+    far = np.linalg.norm(away, axis=-1)
+    over = reach(eye, np.arccos(np.clip(away @ eye.gaze / far, -1, 1))) + least
+    return eye.centre + away * (np.maximum(far, over) / far)[..., None]
 
 
-def _egg() -> np.ndarray:
-    """A unit sphere (k, 3): rings about the upright axis, then the poles."""
-    polar = np.linspace(0, np.pi, _RINGS + 2)[1:-1]
-    turn = 2 * np.pi * np.arange(_AROUND) / _AROUND
-    ring = np.stack([np.cos(turn), np.sin(turn), np.zeros(_AROUND)], axis=1)
-    body = np.sin(polar)[:, None, None] * ring - np.cos(polar)[:, None, None] * np.array([0, 0, 1.0])
-    return np.concatenate([body.reshape(-1, 3), [[0, 0, -1.0], [0, 0, 1.0]]])
-
-
-def _faces(right: bool) -> np.ndarray:
-    one = lathe_faces(_RINGS, _AROUND)
-    both = np.concatenate([one, np.where(one < 0, -1, one + _RINGS * _AROUND + 2)])
-    return (flipped(both) if right else both).astype(np.int32)
+def _faces() -> np.ndarray:
+    """(m, 4) int32: a front and a back sheet that share their border."""
+    front = np.arange(ALONG * ACROSS).reshape(ALONG, ACROSS)
+    back = front.copy()
+    back[1:-1, 1:-1] = front.size + np.arange((ALONG - 2) * (ACROSS - 2)).reshape(ALONG - 2, ACROSS - 2)
+    sheets = []
+    for table, way in ((front, 1), (back, -1)):
+        quads = np.stack([table[:-1, :-1], table[1:, :-1], table[1:, 1:], table[:-1, 1:]], axis=-1).reshape(-1, 4)
+        sheets.append(quads[:, ::way])
+    return np.concatenate(sheets).astype(np.int32)

@@ -158,22 +158,22 @@ def turned_eye(vertices: np.ndarray, centre: np.ndarray, rotation: np.ndarray) -
     return out
 
 
-def eye_mesh(eye: Eye, corner: np.ndarray) -> Mesh:
-    """The eye part: the ball looking along ``eye.gaze``, and the caruncle beside the inner corner (3,) mm of the lids.
+def eye_mesh(eye: Eye, lower: np.ndarray, upper: np.ndarray) -> Mesh:
+    """The eye part: the ball looking along ``eye.gaze``, and the caruncle in the inner corner of the lids.
 
-    The right eye (corner on the subject's left of the ball) is the mirror image of the left one.
+    lower, upper : (k, 3) mm, the lids' backs from the inner corner outward (`caruncle`). The right eye (corner on the
+    subject's left of the ball) is the mirror image of the left one.
     """
     from .caruncle import caruncle
 
     up = _across(np.array([0.0, 0.0, 1.0]), eye.gaze)
     left = np.cross(up, -eye.gaze) * -1.0
-    mirrored = float((corner - eye.centre) @ left) > 0
+    mirrored = float((lower[0] - eye.centre) @ left) > 0
     vertices = ball_vertices(eye, -left if mirrored else left, up)
     faces, material = ball_faces(mirrored)
-    piece = caruncle(eye, corner)
-    more = np.where(piece.faces < 0, -1, piece.faces + len(vertices))
+    piece = caruncle(eye, lower, upper)
     return Mesh(
         np.concatenate([vertices, piece.vertices]),
-        np.concatenate([faces, more]).astype(np.int32),
-        material=np.concatenate([material, np.full(len(more), MATERIALS["eye_l"].index("caruncle"), np.int16)]),
+        np.concatenate([faces, piece.faces + len(vertices)]).astype(np.int32),
+        material=np.concatenate([material, np.full(len(piece.faces), MATERIALS["eye_l"].index("caruncle"), np.int16)]),
     )

@@ -49,18 +49,25 @@ class LidEdge:
         return np.take_along_axis(a, best, 0)[0], np.take_along_axis(angle, best, 0)[0]
 
 
-def strips(pair, column, start, count) -> np.ndarray:
-    """(v,) for each lid vertex the entry of ``start`` (rows on the margin) whose strip across the lid it belongs to."""
-    row = np.full(count, -1)
+def strips(pair, column, start, points) -> tuple[np.ndarray, np.ndarray]:
+    """(v,) for each lid vertex the entry of ``start`` (rows on the margin) whose strip across the lid it belongs to, and
+    (v,) mm along that strip from the margin; -1 and 0 where it belongs to none.
+
+    points : (n, 3) mm, the whole skin's
+    """
+    row = np.full(len(points), -1)
     row[column] = np.arange(len(column))
     ends = row[pair]
     ends = ends[(ends >= 0).all(axis=1)]
     ends = np.concatenate([ends, ends[:, ::-1]])
-    root = np.full(len(column), -1)
+    step = np.linalg.norm(points[column[ends[:, 0]]] - points[column[ends[:, 1]]], axis=1)
+    root, length = np.full(len(column), -1), np.zeros(len(column))
     root[start] = np.arange(len(start))
     for _ in range(8):
-        step = ends[(root[ends[:, 0]] >= 0) & (root[ends[:, 1]] < 0)]
-        if not len(step):
+        new = np.flatnonzero((root[ends[:, 0]] >= 0) & (root[ends[:, 1]] < 0))[::-1]
+        if not len(new):
             break
-        root[step[::-1, 1]] = root[step[::-1, 0]]
-    return root
+        before, after = ends[new].T
+        root[after] = root[before]
+        length[after] = length[before] + step[new]
+    return root, length

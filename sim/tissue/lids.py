@@ -12,13 +12,16 @@ from ..anatomy.eyeball import reach
 from ..anatomy.head import Eye, Head
 from ..mesh import edges
 from .layers import Layers
+from .lid_closing import lower_share, relief
 from .lid_edges import LidEdge, strips
 from .structures import Lids
 
-#: Share of the opening that the lower lid covers in a blink (the upper lid does the rest).
-LOWER_SHARE = 0.12
-#: Closed lids press on each other, mm beyond the first touch of their limit surfaces.
-_SEAL = 0.03
+#: The middle of a lid lags behind its ends as it closes, so that its edge stays an arc: exponents over the share at the
+#: corners of the eye and at its middle.
+_LAG = (0.8, 1.35)
+#: Closed lids are pressed on each other by this much, mm, as the edges are measured column by column: between the columns
+#: they reach farther, so it is less than nothing.
+_SEAL = -0.08
 #: Share of a vertical gaze that the lids follow: (upper lid down, up; lower lid down, up).
 _FOLLOW = (0.75, 0.6, 0.3, 0.12)
 #: mm between skin and eyeball where the lid is taut.
@@ -80,7 +83,7 @@ def build_lids(head: Head, layers: Layers, side: str) -> Lids | None:
     turn = np.unique(np.concatenate([pair[back[pair[:, 1]], 0], pair[back[pair[:, 0]], 1]]))
     edge = np.isin(column, turn) & ~inner & (share[column] > 0.4)
     surface = LidEdge(head, column, edge, inner, frame, eye.centre)
-    root = strips(pair, column, surface.rows, len(v))
+    root, length = strips(pair, column, surface.rows, v)
     at, level = surface.reach(v, upper)
     if len(at) >= 8:
         first, last = at.argmin(), at.argmax()
@@ -130,7 +133,9 @@ def build_lids(head: Head, layers: Layers, side: str) -> Lids | None:
         hold=weight**2 * np.where(inner, 0.5, 1.0),
         opening=opening,
         missing=missing,
-        middle=np.clip((1 - np.abs(across)) / 0.5, 0, 1),
+        middle=np.clip(1.15 * (1 - across**2), 0, 1),
+        lower_share=lower_share(within, corners, *curves, eye.radius),
+        relief=np.zeros((len(column), 3)),
         seal=np.zeros(len(column)),
         contact_column=touching,
         clearance=clearance,
@@ -139,6 +144,9 @@ def build_lids(head: Head, layers: Layers, side: str) -> Lids | None:
     )
     if opening.max() <= 0 or len(surface.rows) < 8:
         return lids
+    flat = lid_targets(lids, 1.0, 1.0, np.zeros(2))
+    spread = relief(lids, flat, root, length, lambda points: eyeball_radius(lids, points, np.zeros(2)))
+    lids = replace(lids, relief=spread)
     return replace(lids, seal=_seal(lids, head, surface, within))
 
 
@@ -195,8 +203,8 @@ def lid_targets(lids: Lids, upper: float, lower: float, gaze: np.ndarray) -> np.
     shut = np.clip(upper, 0, 1)
     along = (1 - 0.6 * shut) * (_FOLLOW[3] * rise - _FOLLOW[2] * down)
     follow = (1 - shut) * (_FOLLOW[1] * rise - _FOLLOW[0] * down) + shut * along
-    turn_upper = -upper * (1 - LOWER_SHARE) * travel + lids.middle * follow
-    turn_lower = lower * LOWER_SHARE * lids.opening + lids.middle * along
+    turn_upper = -_lagging(lids, upper) * (1 - lids.lower_share) * travel + lids.middle * follow
+    turn_lower = _lagging(lids, lower) * lids.lower_share * lids.opening + lids.middle * along
     # never past each other: the meeting line limits both, whichever way the eye looks
     closed = np.maximum(turn_lower - turn_upper, 1e-9)
     over = np.minimum(lids.opening / closed, 1.0)
@@ -222,7 +230,14 @@ def lid_targets(lids: Lids, upper: float, lower: float, gaze: np.ndarray) -> np.
     height = height + lids.inner * np.abs(turn) * (0.4 + 2.5 * (1 - lids.weight)) * (lids.weight < 0.99)
     want = size + close * (under + height - size) + (1 - close) * (height - gap)
     want = np.maximum(want, under + np.minimum(gap, 0.15))
-    return lids.eye.centre + target * (want / np.maximum(size, 1e-9))[:, None]
+    return lids.eye.centre + target * (want / np.maximum(size, 1e-9))[:, None] + (share**2)[:, None] * lids.relief
+
+
+def _lagging(lids: Lids, amount: float):
+    """(v,) how far each part of a lid is when its blink is at ``amount``."""
+    if not 0 < amount < 1:
+        return amount
+    return amount ** (_LAG[0] + (_LAG[1] - _LAG[0]) * lids.middle)
 
 
 def at_rest(lids: Lids) -> np.ndarray:

@@ -85,6 +85,8 @@ class Lids:
     upper : (v,) bool; opening (v,) rad between the margins at the vertex's place;
     missing (v,) rad that a scan with closed eyes lacks to an open eye; inner (v,) bool: behind the margin
     middle : (v,) 0 at the corners of the eye, 1 between them
+    lower_share (v,) share of the opening that the lower lid covers in a blink
+    relief (v, 3) mm by which shut lids lie otherwise than plain turning would have it
     seal (v,) rad by which each lid goes on when closed, until the limit surfaces meet
     profile : (b,) eyeball radius over the angle from the gaze, `profile_angle` (b,)
     """
@@ -105,6 +107,8 @@ class Lids:
     missing: np.ndarray
     middle: np.ndarray
     inner: np.ndarray
+    lower_share: np.ndarray
+    relief: np.ndarray
     seal: np.ndarray
     contact_column: np.ndarray
     clearance: np.ndarray
