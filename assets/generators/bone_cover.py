@@ -4,8 +4,8 @@
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ...sim.adapt.bone import NEAR, depth_under, keep_inside
-from ...sim.adapt.closest import Surface
+from ...sim.adapt.bone_inside import keep_inside
+from ...sim.adapt.skin_cover import SkinCover
 from ...sim.mesh import Mesh
 
 #: mm of tissue over bone: under the skin one sees, and behind linings.
@@ -17,9 +17,6 @@ def covered(bone: Mesh, skin: Mesh, inner: np.ndarray) -> Mesh:
 
     skin : the reference skin; inner : (n,) its group of that name. What was symmetric stays so.
     """
-    _, found = depth_under(bone.vertices, Surface(skin.vertices, skin.triangles), NEAR)
-    nearest = cKDTree(skin.vertices).query(np.where(found.found[:, None], found.points, 0.0))[1]
-    least = np.where(inner[nearest] > 0.5, LINING, SEEN)
-    moved = keep_inside(bone, Surface(skin.vertices, skin.triangles), least)
+    moved = keep_inside(bone, SkinCover(skin, inner, LINING), np.full(len(bone.vertices), SEEN))
     mirror = cKDTree(bone.vertices).query(bone.vertices * [-1, 1, 1])[1]
     return bone.moved(0.5 * (moved + moved[mirror] * [-1, 1, 1]))

@@ -100,7 +100,7 @@ def make_skull(skin: Mesh, groups: dict[str, np.ndarray], landmarks: dict[str, n
 
     mesh = bone_mesh(field, low, high, 4.15, upper, far, 8.5)
     names = [name for name in SKULL if name not in ("pg", "sl", "go_l", "go_r")]
-    return space.kept_inside(space.snapped(mesh, names, reach=12.0))
+    return space.snapped(mesh, names, reach=12.0)
 
 
 def make_skull_landmarks(

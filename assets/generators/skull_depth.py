@@ -14,6 +14,9 @@ from .skull_nets import mirror_index, symmetric
 #: Bone stays this far from the lining of mouth, nose and lids, mm.
 CLEARANCE = 0.6
 
+#: mm from a sample of the skin to the farthest place that it speaks for.
+BETWEEN = 1.4
+
 #: Thin-skinned places between the landmarks of the table: skin landmarks to average -> mm (estimated).
 _BETWEEN = {
     ("en",): 4.0, ("en", "n"): 3.5, ("en", "al"): 5.0, ("ex",): 5.0, ("ps",): 4.0, ("pi",): 4.0, ("se",): 5.0,
@@ -101,7 +104,8 @@ class BoneSpace:
 
     def too_shallow(self, points):
         """(n,) mm, positive where bone would be nearer to the skin than its depth there."""
-        distance, near = self._tree.query(points)
+        distance, near = _signed(points, self._tree, self.points, self.directions)
+        distance = np.abs(distance)
         # Only the whole skin, linings included, tells inside from outside.
         clear = _signed(points, self._all_tree, self._all, self._all_directions)[0]
         below = np.where(clear > 0, distance, -distance)
@@ -136,6 +140,13 @@ class BoneSpace:
         tree = cKDTree(lining[:, :2])
         found = [tree.query_ball_point(p, radius) or [tree.query(p)[1]] for p in np.asarray(xy)]
         return np.array([rise * (rise * lining[near, 2]).max() for near in found])
+
+    def lid_cups(self):
+        """Lowest and highest corner (3,) mm of the box round the left eye's lids as they line the eyeball."""
+        en, ex = self.landmarks["en_l"], self.landmarks["ex_l"]
+        near = np.abs(self._lining - (en + ex) / 2) < [0.65 * (ex - en)[0], 32, 20]
+        cups = self._lining[near.all(axis=1)]
+        return cups.min(axis=0), cups.max(axis=0)
 
     def depth_seen(self, points):
         """(n,) mm to the nearest skin that is seen."""
@@ -197,8 +208,11 @@ def sampled(vertices, triangles, spacing):
 
 def _signed(points, tree, samples, normals):
     distance, near = tree.query(points)
-    outside = ((points - samples[near]) * normals[near]).sum(1) > 0
-    return np.where(outside, -distance, distance), near
+    rise = ((points - samples[near]) * normals[near]).sum(1)
+    # Between samples the surface is their plane: the distance to the nearest of them would ripple.
+    aside = np.sqrt(np.maximum(distance**2 - rise**2, 0))
+    distance = np.hypot(rise, np.maximum(aside - BETWEEN, 0))
+    return np.where(rise > 0, -distance, distance), near
 
 
 def _without_ears(skin, ear):

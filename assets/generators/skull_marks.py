@@ -15,6 +15,7 @@ class SkullMarks:
 
     rim : (k, 3) the rim of the orbit, closed, from its medial corner over the top
     eye : middle of the eye opening; apex : deep end of the orbit
+    cups : (2, 3) lowest and highest corner of what the lids line behind the eyeball's front
     malar : middle of the cheekbone's body; condyle : middle of the mandible's condyle
     line : (k, 2) y and z of the temporal line as seen from the side, closed, from the brow over the top
     base : z of the skull's base; floor : z of the floor of the nose
@@ -23,6 +24,7 @@ class SkullMarks:
     rim: np.ndarray
     eye: np.ndarray
     apex: np.ndarray
+    cups: np.ndarray
     malar: np.ndarray
     condyle: np.ndarray
     line: np.ndarray
@@ -75,6 +77,7 @@ def skull_marks(space: BoneSpace) -> SkullMarks:
         rim=rim,
         eye=eye,
         apex=np.array([13.5, eye[1] + 46.0, eye[2] + 4.5]),
+        cups=np.array(space.lid_cups()),
         malar=malar_centre(space),
         condyle=condyle_centre(space),
         line=line,

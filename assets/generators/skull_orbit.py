@@ -3,8 +3,15 @@
 
 import numpy as np
 
-from .skull_field import carve, curve, join, meet, plate, tube
+from .skull_field import carve, curve, ellipsoid, join, meet, plate, tube
 from .skull_marks import SkullMarks
+
+#: Fat between the lids' lining and the walls of the orbit, mm.
+FAT = 2.4
+#: Thickness of the walls behind the rim, mm.
+WALL = 5.0
+#: Thickness of the nasal bones, mm.
+ROOF = 4.0
 
 
 class Orbit:
@@ -12,6 +19,9 @@ class Orbit:
 
     def __init__(self, marks: SkullMarks):
         self.apex, rim = marks.apex, marks.rim
+        low, high = marks.cups
+        middle = np.array([(low[0] + high[0]) / 2, high[1] - (high[2] - low[2]) / 2, (low[2] + high[2]) / 2])
+        self.globe = middle, (high - low)[[0, 2, 2]] / 2 + FAT
         self.level = rim[:, 1].mean()
         # The rim's outline as seen from the apex, in polar coordinates.
         flat = self._seen(rim)
@@ -46,16 +56,15 @@ class Orbit:
         off = self._seen(p) - self.middle
         radius = np.interp(np.arctan2(off[:, 1], off[:, 0]), self._turn, self._radius)
         cone = (np.linalg.norm(off, axis=1) - radius) * np.maximum(self._taper(p[:, 1]), 0.05)
-        return meet(cone, p[:, 1] - self.apex[1] + 3.0, 5)
+        cone = meet(cone, p[:, 1] - self.apex[1] + 3.0, 5)
+        return join(cone, ellipsoid(p, *self.globe), 4)
 
 
 class Nose:
     """Nasal bones, the pear-shaped aperture with its spine, and the cavity behind."""
 
     #: Outline of the aperture: share of the way down, half width mm.
-    PEAR = np.array(
-        [(-0.2, -3.0), (0.0, 3.4), (0.12, 5.6), (0.35, 7.6), (0.6, 10.4), (0.8, 12.0), (0.93, 11.6), (1.3, 9)]
-    )
+    PEAR = np.array([(-0.3, 2.0), (0.0, 3.4), (0.2, 4.6), (0.4, 6.8), (0.6, 9.6), (0.8, 11.6), (0.93, 11.4), (1.3, 9)])
 
     def __init__(self, space, marks: SkullMarks):
         at, self.marks, self.space = space.targets, marks, space
@@ -76,13 +85,12 @@ class Nose:
         grid = np.stack([curve(grid[:, k], 24) for k in range(16)], axis=1).reshape(-1, 2)
         thick = np.tile(np.linspace(2.5, 2.9, 16), 24)
         self.roof = plate(self._under(grid, thick), thick)
-        # The edge of the aperture, from the nasal bones down to the floor.
-        down = np.linspace(0.1, 1.0, 40)
-        wide = np.interp(down, *self.PEAR.T)
-        z = self.top + down * (self.floor - self.top)
-        thick = np.interp(down, [0, 0.3, 1], [2.6, 2.7, 3.0])
-        edge = [plate(self._under(np.stack([wide + off, z], axis=1), thick), thick) for off in (2.0, 5.0, 8.0)]
-        self.edge = lambda p: join(join(edge[0](p), edge[1](p), 2), edge[2](p), 2)
+        # The edge of the aperture, seen from the side: from the tip of the nasal bones back and down to the floor.
+        back = min(float(space.before(np.array([[15.5, rhi[2] - 14.0]]), 2.0)[0]), ans[1] + 6.0)
+        low = np.array([(1.6, -1.5), (0.0, 0.0), (-2.0, 0.2), (-4.5, 0.42), (-8.0, 0.66), (-12.0, 0.88), (-16.0, 1.0)])
+        self.edge = (rhi[2] + low[::-1, 0], rhi[1] + low[::-1, 1] * (back - rhi[1]))
+        # The ridge of the nose, which the cavity follows at the thickness of its bones.
+        self.ridge, self.slope = rhi, (n[2] - rhi[2]) / max(n[1] - rhi[1], 4.0)
 
     def _under(self, xz, thick):
         """(k, 3) points so deep under the skin that a plate of half thickness ``thick`` (k,) just fits, evened out."""
@@ -92,7 +100,9 @@ class Nose:
         """(n,) mm, negative in the aperture and in the cavity behind it."""
         down = (p[:, 2] - self.top) / (self.floor - self.top)
         wide = np.interp(down, *self.PEAR.T) + np.clip((p[:, 1] - self.ans[1] - 6) * 0.25, 0, 2.0)
-        pear = meet(p[:, 0] - wide, np.maximum(self.floor - p[:, 2], p[:, 2] - self.top - 8), 6.0)
+        under = self.ridge[2] + self.slope * (p[:, 1] - self.ridge[1]) - p[:, 2]
+        roof = np.maximum(ROOF - under / np.hypot(1, self.slope), p[:, 2] - self.top - 6)
+        pear = meet(p[:, 0] - wide, np.maximum(self.floor - p[:, 2], roof), 5.0)
         return meet(pear, p[:, 1] - (self.ans[1] + 24), 5)
 
     def cleared(self, bone, p):
@@ -101,7 +111,10 @@ class Nose:
 
     def bones(self, p):
         """(n,) mm, the bones round the aperture."""
-        bone = join(self.roof(p), self.edge(p), 2.5)
+        # A wedge whose sides the skin's depth trims: nasal bones and the frontal processes of the maxilla.
+        wedge = meet(np.interp(p[:, 2], *self.edge) - p[:, 1], p[:, 0] - 15.5, 3)
+        wedge = meet(wedge, np.maximum(p[:, 2] - self.ridge[2] - 22, self.floor + 1 - p[:, 2]), 3)
+        bone = join(self.roof(p), meet(wedge, p[:, 1] - self.ans[1] - 12, 3), 2.5)
         # Between the orbits: the ethmoid, without its cells.
         top, bridge = self.marks.rim[:, 2].max(), self.space.targets["n"]
         slope = np.interp(
@@ -127,7 +140,7 @@ def opened(bone, p, orbit: Orbit, nose: Nose):
     """``bone`` (n,) with rims and nasal bones added, and the openings carved out of it."""
     hollow = orbit.hollow(p)
     behind = p[:, 1] - (orbit.level - 4)
-    bone = join(bone, meet(hollow - 5.0, 6 - behind, 4), 3)  # thin walls of its own behind the rim
+    bone = join(bone, meet(hollow - WALL, 6 - behind, 4), 3)  # thin walls of its own behind the rim
     bone = join(bone, orbit.rim(p), 3.0)
     bone = join(bone, nose.bones(p), 3.0)
     bone = carve(bone, nose.hole(p), 2.2)

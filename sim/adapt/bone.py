@@ -1,19 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bone under fitted skin: moved by tissue-depth vectors, then kept inside (Kähler et al. 2002, section 5.2, item 2)."""
+"""Bone under fitted skin: moved by tissue-depth vectors (Kähler et al. 2002, section 5.2, item 2), and how deep it lies."""
 
 import numpy as np
-from scipy.sparse import csr_matrix, identity, vstack
 
 from ..anatomy.inside import inside
 from ..anatomy.tissue_depth import skull_targets
-from ..mesh import Mesh
 from .closest import Surface
-from .smooth_system import factorised, laplacian
 from .thin_plate_spline import ThinPlateSpline
 
-#: mm of tissue that always remain over bone: where the reference has little, and where it has more.
-THIN, THICK = 1.2, 2.0
-INSIDE_MOUTH = 0.4  # mm, toward the closed cups behind lips, lids and nostrils
+#: mm of tissue that always remain over bone: at the very least, where the reference has little, where it has more.
+LEAST, THIN, THICK = 1.12, 1.25, 2.0
+LINING = 0.45  # mm, toward what lines mouth, lids and nostrils
 NEAR = 12.0  # mm: bone deeper than this needs no test
 
 
@@ -49,56 +46,7 @@ def follow_skin(vertices, skull_marks, landmarks, vectors, smoothing: float = 2.
     return ThinPlateSpline.fit(source, target, smoothing).transform(vertices)
 
 
-def least_depth(reference_depth, inner) -> np.ndarray:
-    """(k,) mm of tissue that must remain over bone vertices.
-
-    reference_depth (k,) mm over the same vertices of the reference head; inner (k,) bool: the nearest skin there is a
-    cup behind lips, lids or nostrils. Never more than the reference itself has.
-    """
+def least_depth(reference_depth) -> np.ndarray:
+    """(k,) mm of tissue that must remain over bone vertices, given what the reference head has over them (k,)."""
     wanted = np.clip(0.5 * reference_depth, THIN, THICK)
-    wanted = np.where(inner, INSIDE_MOUTH, wanted)
-    return np.where(reference_depth > 0, np.minimum(wanted, np.maximum(0.95 * reference_depth, 0.3)), 0.3)
-
-
-def keep_inside(bone: Mesh, skin: Surface, least, rounds: int = 12) -> np.ndarray:
-    """Bone vertices (n, 3) moved smoothly until each, and each face, lies ``least`` (n,) mm or deeper under the skin."""
-    start = bone.vertices
-    bend = laplacian(start, bone.faces)
-    n = len(start)
-    smooth = (bend.T @ bend + 0.002 * identity(n)).tocsr()
-    look = vstack([identity(n), face_middles(bone.faces, n)]).tocsr()
-    least = np.concatenate([least, np.minimum(least[bone.faces[:, :3]].min(axis=1), THIN)])
-    moved = start.copy()
-    pulled = np.zeros(look.shape[0], dtype=bool)
-    goal = np.zeros((look.shape[0], 3))
-    watch = np.arange(look.shape[0])
-    rest = look @ start
-    for turn in range(rounds):
-        points = look[watch] @ moved
-        depth, found = depth_under(points, skin, NEAR)
-        lack = least[watch] - depth
-        wrong = found.found & (lack > 1e-3)
-        if not wrong.any():
-            return moved
-        way = (found.points - points)[wrong] * np.where(depth[wrong] < 0, 1.0, -1.0)[:, None]
-        length = np.linalg.norm(way, axis=1, keepdims=True)
-        # On the skin itself the way is unsure, and the skin's own normal tells.
-        way = np.where(length > 0.05, way / np.maximum(length, 1e-9), -found.normals[wrong])
-        bad, push = watch[wrong], (lack[wrong, None] + 0.05) * way
-        goal[bad] = points[wrong] - rest[bad] + push
-        pulled[bad] = True
-        watch = watch[found.found & (lack > -4.0)]  # what is that much deeper than it must be, stays so
-        if turn < rounds - 4:
-            weight = look[pulled].T * 3.0
-            moved = start + factorised((smooth + weight @ look[pulled]).tocsc())(weight @ goal[pulled])
-        else:  # what smoothness will not give, is given without
-            share = look[bad].T @ np.ones(len(bad))
-            moved += (look[bad].T @ push) / np.maximum(share, 1.0)[:, None]
-    return moved
-
-
-def face_middles(faces, n) -> csr_matrix:
-    """(m, n) sparse rows that give the middle of each face, of three or four corners."""
-    real = faces >= 0
-    rows = np.repeat(np.arange(len(faces)), real.sum(axis=1))
-    return csr_matrix((1 / real.sum(axis=1)[rows], (rows, faces[real])), shape=(len(faces), n))
+    return np.maximum(np.minimum(wanted, 0.95 * reference_depth), LEAST)

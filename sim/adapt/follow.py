@@ -13,14 +13,14 @@ from scipy.spatial import cKDTree
 
 from ..anatomy.head import Head
 from ..anatomy.tissue_depth import tissue_vectors
-from ..mesh_subdivision import drawn
 from ..progress import Progress, Work
 from . import bone, eyeballs
-from .closest import Surface
+from .bone_inside import keep_inside
 from .lining import lined, lips_met
 from .mouth import mouth_similarity, with_teeth
 from .muscles import carried_muscles
 from .rest import BONES, TEETH, Rest, rest_of
+from .skin_cover import SkinCover
 from .skin_fit import group
 from .thin_plate_spline import similarity
 from .untangle import restored, untangled
@@ -92,11 +92,12 @@ def follow(reference: Head, skin: np.ndarray, unseen: np.ndarray | None = None) 
         parts[part] = eyeballs.eye_part(rest, side, final, carried[part], eye)
 
     yield Progress(0.5, "Bone under the skin")
-    surface = Surface(drawn(reference.skin.faces, final), reference.skin.triangles)
+    cover = SkinCover(reference.skin.moved(final), group(reference, "inner"), bone.LINING)
     moved = 0.0
     for name in BONES:
         before = parts[name]
-        parts[name] = bone.keep_inside(reference.parts[name].moved(before), surface, rest.needs[name] * min(scale, 1.0))
+        least = np.maximum(rest.needs[name] * min(scale, 1.0), bone.LEAST)
+        parts[name] = keep_inside(reference.parts[name].moved(before), cover, least)
         moved = max(moved, float(np.linalg.norm(parts[name] - before, axis=1).max()))
     jaw = carried_jaw(rest, parts, mouth, scale)
 

@@ -12,11 +12,11 @@ from ..anatomy.head import Head
 from ..mesh import edges
 from ..mesh_subdivision import drawn
 from . import bone
-from .closest import Surface
 from .eyeballs import lid_contact
 from .lid_contact import LidContact
 from .openings import rims
 from .refine import scattered, thinned
+from .skin_cover import SkinCover
 from .skin_fit import group
 from .smooth_system import laplacian
 from .thin_plate_spline import System, ThinPlateSpline
@@ -71,7 +71,8 @@ class Rest:
         self.lip_rim = np.flatnonzero(self.rim & lips)
         self.lip_pairs = self._lip_pairs()
         self.organs, self.behind = self._organs()
-        self.needs = {name: self._needs(name) for name in BONES}
+        cover = SkinCover(skin, group(reference, "inner"), bone.LINING)
+        self.needs = {name: bone.least_depth(cover.depth(reference.parts[name].vertices)) for name in BONES}
         teeth = cKDTree(np.concatenate([reference.parts[name].vertices for name in TEETH]))
         self.from_teeth = {name: teeth.query(reference.parts[name].vertices)[0] for name in BONES}
         seen = np.flatnonzero(~self.inner)
@@ -143,12 +144,3 @@ class Rest:
             behind[grown & ~front] = step
             front = grown
         return {n: np.sort(np.concatenate(p)) if p else np.zeros(0, int) for n, p in organs.items()}, behind
-
-    def _needs(self, name):
-        skin = self.head.skin
-        depth, found = bone.depth_under(
-            self.head.parts[name].vertices, Surface(skin.vertices, skin.triangles), bone.NEAR
-        )
-        # `Surface` welds, so the linings are told by the skin's own nearest vertex.
-        nearest = cKDTree(skin.vertices).query(np.where(found.found[:, None], found.points, 0.0))[1]
-        return bone.least_depth(depth, self.inner[nearest] & found.found)
