@@ -92,13 +92,15 @@ def make_skull(skin: Mesh, groups: dict[str, np.ndarray], landmarks: dict[str, n
     at = space.targets
     low = np.array([0, min(at["rhi"][1], at["g"][1]) - 8, upper.crest.min() - 6])
     high = np.array([at["eu_l"][0] + 8, at["op"][1] + 8, at["v"][2] + 8])
-    brow, back = at["g"][2] + 12.0, at["po_l"][1] + 38.0
+    brow, back = at["g"][2] + 12.0, at["po_l"][1] + 30.0
 
     def far(p):
         """The vault above the brow, and the back of the head."""
-        return p[:, 2] - np.interp(p[:, 1], [at["g"][1], at["po_l"][1], back, back + 12], [brow, brow - 10, -8, -60])
+        return p[:, 2] - np.interp(p[:, 1], [at["g"][1], at["po_l"][1], back, back + 12], [brow, brow - 24, -8, -60])
 
-    mesh = bone_mesh(field, low, high, 4.15, upper, far, 8.5)
+    # Where the edge of the nasal aperture is thin.
+    finer = ((0.0, 11.0, 3.4), (low[1], at["ans"][1] + 4.0, 3.2), (at["ans"][2] + 2.0, at["rhi"][2] + 8.0, 3.2))
+    mesh = bone_mesh(field, low, high, 4.3, upper, far, 9.0, finer)
     names = [name for name in SKULL if name not in ("pg", "sl", "go_l", "go_r")]
     return space.snapped(mesh, names, reach=12.0)
 

@@ -16,6 +16,8 @@ CLEARANCE = 0.6
 
 #: mm from a sample of the skin to the farthest place that it speaks for.
 BETWEEN = 1.4
+#: Half the width of the widest cavity behind lips, lids and nostrils, mm.
+WIDE = 17.0
 
 #: Thin-skinned places between the landmarks of the table: skin landmarks to average -> mm (estimated).
 _BETWEEN = {
@@ -52,6 +54,9 @@ class BoneSpace:
         self._all_tree = cKDTree(self._all)
         lined = triangles[inner[triangles].all(axis=1)]
         self._lining = sampled(vertices, lined, 2.5)[0] if len(lined) else np.zeros((0, 3))
+        self._all_lined = np.zeros(len(self._all), dtype=bool)
+        if len(lined):
+            self._all_lined[:] = cKDTree(self._lining).query(self._all)[0] < 1e-6
         self._place_targets()
         known = {**skin_counterparts(self.landmarks), **self._extra_counterparts()}
         spots = [(known[n], table()[_base(n)].mean - _LESS.get(n, 0)) for n in known if not n.startswith(("po", "ans"))]
@@ -107,7 +112,7 @@ class BoneSpace:
         distance, near = _signed(points, self._tree, self.points, self.directions)
         distance = np.abs(distance)
         # Only the whole skin, linings included, tells inside from outside.
-        clear = _signed(points, self._all_tree, self._all, self._all_directions)[0]
+        clear = self.clearance(points)
         below = np.where(clear > 0, distance, -distance)
         return np.maximum(self.depth[near] - below, CLEARANCE - clear)
 
@@ -154,7 +159,9 @@ class BoneSpace:
 
     def clearance(self, points):
         """(n,) mm to the nearest skin or lining, negative where there is air."""
-        return _signed(points, self._all_tree, self._all, self._all_directions)[0]
+        clear, near = _signed(points, self._all_tree, self._all, self._all_directions)
+        # No cavity is so wide: what lies that far from its lining lies in the flesh behind it.
+        return np.where(self._all_lined[near] & (clear < -WIDE), -clear, clear)
 
     def kept_inside(self, mesh: Mesh, clear=1.2) -> Mesh:
         """``mesh`` with vertices that come too near to any skin moved inward."""

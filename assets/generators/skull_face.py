@@ -83,7 +83,7 @@ class Cheekbone:
     def __call__(self, p):
         """(n,) mm."""
         bone = join(self.body(p), tube(p, self.frontal, [5.2, 4.2, 5.6], ((0.35, 0.94, 0), 1.25)), 4)
-        thick = np.interp(np.arange(30), [0, 7, 15, 22, 29], [6.5, 5.0, 4.6, 4.8, 6.0])
+        thick = np.interp(np.arange(30), [0, 7, 15, 22, 29], [7.0, 5.8, 5.4, 5.4, 6.4])
         bone = join(bone, tube(p, self.bar[::2], thick[::2], ((1, 0, 0), 1.7)), 5)
         bone = join(bone, tube(p, self.root, [4.4, 5.0]), 5)
         return join(bone, tube(p, self.strut, [7.0, 5.6, 4.5]), 6)

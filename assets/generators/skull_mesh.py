@@ -10,7 +10,7 @@ from .skull_patch import cut, evened, left_half, sewn, whole
 from .skull_sockets import heights, socket_strip
 
 
-def bone_mesh(field, low, high, cell: float, arch: DentalArch, far=None, coarse: float = 0.0) -> Mesh:
+def bone_mesh(field, low, high, cell: float, arch: DentalArch, far=None, coarse: float = 0.0, finer=None) -> Mesh:
     """The closed, symmetric mesh of a bone.
 
     Parameters
@@ -20,8 +20,9 @@ def bone_mesh(field, low, high, cell: float, arch: DentalArch, far=None, coarse:
     cell : mm, size of faces
     arch : the ridge that gets sockets
     far, coarse : function of points -> (n,) mm, positive where faces of size ``coarse`` mm will do
+    finer : where faces are smaller, see `surface_nets`
     """
-    half = left_half(surface_nets(field, low, high, cell))
+    half = left_half(surface_nets(field, low, high, cell, finer=finer))
     if far is not None:
         vault = left_half(surface_nets(field, low, high, coarse))
         half = cut(half, far(half.vertices) > 0)

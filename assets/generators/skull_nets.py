@@ -18,7 +18,7 @@ from ...sim.mesh import Mesh, edges, vertex_normals
 _CORNERS = np.array([(i, j, k) for i in (0, 1) for j in (0, 1) for k in (0, 1)])
 
 
-def surface_nets(field, low, high, cell, rounds=4) -> Mesh:
+def surface_nets(field, low, high, cell, rounds=4, finer=None) -> Mesh:
     """The zero surface of ``field`` as a closed, symmetric mesh of quads, facing outward.
 
     Parameters
@@ -27,9 +27,12 @@ def surface_nets(field, low, high, cell, rounds=4) -> Mesh:
     low, high : (3,) mm, box that holds the surface
     cell : mm, size of a cell
     rounds : relaxation rounds
+    finer : (3, 3) for each axis where cells are smaller, from and to, and their size, mm (None: nowhere)
     """
-    axes = [np.arange(a, b + cell, cell) for a, b in zip(low, high, strict=True)]
-    axes[0] = (np.arange(int(np.ceil(high[0] / cell)) + 1) + 0.5) * cell
+    low = [0.0, *low[1:]]
+    spans = [(0.0, 0.0, cell)] * 3 if finer is None else finer
+    axes = [_ticks(a, b + cell, cell, *span) for a, b, span in zip(low, high, spans, strict=True)]
+    axes[0] = axes[0][:-1] + 0.5 * np.diff(axes[0])
     axes[0] = np.concatenate([-axes[0][::-1], axes[0]])
     shape = tuple(len(a) for a in axes)
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
@@ -48,6 +51,14 @@ def surface_nets(field, low, high, cell, rounds=4) -> Mesh:
                 corners = tuple((one + _CORNERS).T)
                 value[corners] = np.where(value[corners] < 0, value[corners], -0.3)
     return _relaxed(_largest(Mesh(vertices, faces)), field, cell, rounds)
+
+
+def _ticks(low, high, cell, start, end, size):
+    """Places from ``low`` to ``high`` or beyond, ``cell`` apart, between ``start`` and ``end`` about ``size``."""
+    start, end = max(start, low), max(end, low)
+    before = np.linspace(low, start, max(int(np.ceil((start - low) / cell)), 1) + 1)[: None if start > low else 1]
+    within = np.linspace(start, end, max(int(np.ceil((end - start) / size)), 1) + 1)[1:] if end > start else []
+    return np.concatenate([before, within, np.arange(end + cell, high + cell, cell)])
 
 
 def _sampled(field, grid, cell, stride=3):

@@ -103,7 +103,7 @@ class Nose:
         under = self.ridge[2] + self.slope * (p[:, 1] - self.ridge[1]) - p[:, 2]
         roof = np.maximum(ROOF - under / np.hypot(1, self.slope), p[:, 2] - self.top - 6)
         pear = meet(p[:, 0] - wide, np.maximum(self.floor - p[:, 2], roof), 5.0)
-        return meet(pear, p[:, 1] - (self.ans[1] + 24), 5)
+        return meet(pear, p[:, 1] - (self.ans[1] + 18), 5)
 
     def cleared(self, bone, p):
         """``bone`` (n,) with the aperture carved again, and what stands in it."""
@@ -144,5 +144,5 @@ def opened(bone, p, orbit: Orbit, nose: Nose):
     bone = join(bone, orbit.rim(p), 3.0)
     bone = join(bone, nose.bones(p), 3.0)
     bone = carve(bone, nose.hole(p), 2.2)
-    bone = carve(bone, hollow, 1.4)
+    bone = carve(bone, hollow, 2.4)
     return join(bone, nose.within(p), 2.0)

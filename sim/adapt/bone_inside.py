@@ -12,7 +12,8 @@ from .smooth_system import factorised, laplacian
 FREE = 3.0  # mm: what is deeper by this than it must be, stays so
 CLOSE = 1.0  # mm: the same once it has been looked at
 SLACK, MORE = 0.05, 0.06  # mm: so much may lack, so much more is asked for than lacks
-FIRM, FIRMER = 4.0, 3.0  # weight of what is asked against the bending of the bone, and its growth from round to round
+#: Weight of what is asked against the bending of the bone, its growth from round to round, and where that ends.
+FIRM, FIRMER, FIRMEST = 4.0, 3.0, 400.0
 
 
 def keep_inside(bone: Mesh, cover: SkinCover, least, rounds: int = 12) -> np.ndarray:
@@ -32,6 +33,8 @@ def keep_inside(bone: Mesh, cover: SkinCover, least, rounds: int = 12) -> np.nda
     above = np.arange(len(cover.points))
     lack = cover.push(start, need[:n])[1]
     there = lack > -FREE  # what is that much deeper than it must be, stays so
+    if not there.any():
+        return start
     triangles = bone.triangles[there[bone.triangles].any(axis=1)]
     watch = np.concatenate([np.flatnonzero(there), n + np.flatnonzero(there[bone.triangles].any(axis=1))])
     moved = start
@@ -40,19 +43,6 @@ def keep_inside(bone: Mesh, cover: SkinCover, least, rounds: int = 12) -> np.nda
         wrong = np.linalg.norm(push, axis=1) > SLACK
         above, corners, weights, pull = cover.pull(bone.moved(moved), triangles, above, least)
         wants = np.linalg.norm(pull, axis=1) > SLACK
-        import os
-
-        os.environ.get("DBG") and print(
-            "   ",
-            len(watch),
-            wrong.sum(),
-            np.linalg.norm(push, axis=1).max().round(2),
-            len(above),
-            wants.sum(),
-            np.linalg.norm(pull, axis=1).max().round(2),
-            np.linalg.norm(moved - start, axis=1).max().round(2),
-            __import__("time").time(),
-        )
         if not wrong.any() and not wants.any():
             break
         asked.places(watch[wrong], longer(push[wrong]), moved - start)
@@ -86,7 +76,7 @@ class Asked:
 
     def _ask(self, rows, goal):
         self.goal[rows] = goal
-        self.weight[rows] = np.where(self.weight[rows] > 0, FIRMER * self.weight[rows], FIRM)
+        self.weight[rows] = np.where(self.weight[rows] > 0, np.minimum(FIRMER * self.weight[rows], FIRMEST), FIRM)
 
     def system(self):
         """Rows (r, n), their weights (r, r) and the displacements wanted there (r, 3)."""

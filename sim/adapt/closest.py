@@ -160,6 +160,8 @@ class Surface:
     def closest(self, points, reach: float = np.inf) -> Contacts:
         """The closest point of the surface for each of ``points`` (k, 3), if nearer than ``reach`` mm."""
         points = np.asarray(points, dtype=float).reshape(-1, 3)
+        if len(points) == 0:
+            return self._contacts(0, np.zeros(0, int), np.zeros(0), np.zeros(0, int), np.zeros((0, 3)))
         best = np.full(len(points), np.inf)
         triangle, weights = np.full(len(points), -1), np.zeros((len(points), 3))
 

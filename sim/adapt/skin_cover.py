@@ -12,6 +12,7 @@ from .closest import Surface
 
 STEP = 3.0  # mm: the most that is asked of bone at once
 NEXT = 1.5  # mm: places of the skin farther from bone than this besides what they need are left alone
+SURE = 3.0  # mm: nearer than this a normal that is not plain about the side is not trusted
 BESIDE = 3.0  # mm: the drawn skin is nowhere farther from the modelled one
 
 
@@ -108,7 +109,7 @@ def signed_depth(points, surface: Surface, reach: float, whole: Mesh | None = No
     near = np.flatnonzero(found.found)
     rise = np.einsum("ij,ij->i", points[near] - found.points[near], found.normals[near])
     inner = np.full(len(points), whole is None)
-    ask = near[rise > -0.3 * found.distance[near]] if whole is None else near[rise < 0]
+    ask = near[rise > -0.3 * np.minimum(found.distance[near], SURE)] if whole is None else near[rise < 0]
     solid = surface if whole is None else whole
     inner[ask] = winding_number(points[ask], solid.vertices, solid.triangles) > 0.5
     return np.where(inner, depth, -depth), found
