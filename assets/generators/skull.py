@@ -71,7 +71,7 @@ class Skull:
         return bone
 
     def _face_and_base(self, p, bone, space, m):
-        bone = join(bone, self.vault.ridges(p), 8)
+        bone = join(bone, self.vault.ridges(p), 12)
         bone = join(bone, base_middle(p, space, m), 6)
         bone = join(bone, temporal_bone(p, space, m), 5)
         bone = foramen(bone, p, space, m)

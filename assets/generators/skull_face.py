@@ -2,11 +2,15 @@
 """The facial skull: maxilla with its alveolar process and palate, cheekbone and zygomatic arch."""
 
 import numpy as np
+from scipy.ndimage import gaussian_filter
 
 from .skull_arch import DentalArch
 from .skull_depth import BoneSpace
 from .skull_field import carve, curve, ellipsoid, join, meet, plate, tube
 from .skull_marks import SkullMarks
+
+#: Half the thickness of the hard palate, mm.
+PALATE = 2.5
 
 
 class Maxilla:
@@ -29,6 +33,12 @@ class Maxilla:
         grid = np.array([curve(row, 24) for row in (tops, middles, low)])
         grid = np.stack([curve(grid[:, k], 20) for k in range(24)], axis=1)
         self.front = plate(grid.reshape(-1, 3), np.full(20 * 24, 3.2))
+        # The hard palate lies on the roof of the mouth.
+        across, back = np.meshgrid(np.linspace(0, 18, 10), np.linspace(ans[1] + 6, ans[1] + 45, 16), indexing="ij")
+        high = space.mouth_limit(np.stack([across, back], axis=-1).reshape(-1, 2), 1, 2.5).reshape(across.shape)
+        high = gaussian_filter(high, 1.0, mode="nearest") + PALATE + 1.2
+        spots = np.stack([across, back, np.clip(high, ans[2] - 6.0, marks.floor - PALATE)], axis=-1).reshape(-1, 3)
+        self.roof = plate(np.concatenate([spots, spots * [-1, 1, 1]]), np.full(2 * len(spots), PALATE))
 
     def body(self, p):
         """(n,) mm, body, alveolar process and palate."""
@@ -41,11 +51,8 @@ class Maxilla:
 
     def palate(self, p):
         """(n,) mm, the hard palate under the floor of the nose."""
-        ans, arch = self.ans, self.arch
-        roof = np.maximum(arch.limit_middle + 2.2, ans[2] - 4.0)
-        slab = np.abs(p[:, 2] - (roof + 2.0)) - 2.3
-        slab = meet(slab, arch.off(p[:, :2]), 3)  # within the arch
-        return meet(slab, p[:, 1] - (ans[1] + 46 - 0.01 * p[:, 0] ** 2), 3)
+        slab = meet(self.roof(p), self.arch.off(p[:, :2]), 3)  # within the arch
+        return meet(slab, p[:, 1] - (self.ans[1] + 46 - 0.01 * p[:, 0] ** 2), 3)
 
 
 class Cheekbone:

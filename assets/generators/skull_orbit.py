@@ -9,7 +9,7 @@ from .skull_marks import SkullMarks
 #: Fat between the lids' lining and the walls of the orbit, mm.
 FAT = 2.4
 #: Thickness of the walls behind the rim, mm.
-WALL = 5.0
+WALL = 6.5
 #: Thickness of the nasal bones, mm.
 ROOF = 4.0
 

@@ -69,10 +69,10 @@ class Vault:
     def ridges(self, p):
         """(n,) mm, what stands out on the back of the head: protuberance and superior nuchal line."""
         op, base, po = self.space.targets["op"], self.marks.base, self.space.targets["po_l"]
-        inion = np.array([0.0, op[1] - 7.5, 4.0])
-        line = curve([inion, [20, op[1] - 11, 7.0], [42, po[1] + 52, 2.0], [56, po[1] + 28, base + 10]], 20)
-        bump = ellipsoid(p, inion + [0, -1.5, 0.5], (8, 6, 5.5))
-        return join(bump, tube(p, line, np.linspace(4.6, 3.2, 20)), 6)
+        inion = np.array([0.0, op[1] - 10.5, 4.5])
+        line = curve([inion, [20, op[1] - 14, 7.0], [41, po[1] + 50, 2.0], [54, po[1] + 28, base + 11]], 20)
+        bump = ellipsoid(p, inion + [0, -1.5, 0.5], (12, 9, 9))
+        return join(bump, tube(p, line, np.linspace(7.5, 6.0, 20)), 8)
 
 
 def temporal_bone(p, space: BoneSpace, marks: SkullMarks):
@@ -89,7 +89,7 @@ def temporal_bone(p, space: BoneSpace, marks: SkullMarks):
         [12.5, 9.0, 4.2],
     )
     bone = join(block, mastoid, 6)
-    styloid = tube(p, [[po[0] - 13, po[1] - 1, po[2] - 14], [po[0] - 16.5, po[1] - 6.5, po[2] - 34]], [3.8, 1.7])
+    styloid = tube(p, [[po[0] - 13, po[1] - 1, po[2] - 14], [po[0] - 16.5, po[1] - 6.5, po[2] - 29]], [4.2, 2.6])
     return join(bone, styloid, 3)
 
 

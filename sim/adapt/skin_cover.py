@@ -101,15 +101,21 @@ class SkinCover:
 def signed_depth(points, surface: Surface, reach: float, whole: Mesh | None = None):
     """How deep ``points`` (k, 3) lie within a surface, mm, negative outside, at most ``reach``; and the `Contacts`.
 
-    Most are expected within, or outside where ``surface`` is but a piece of a ``whole``: only those whose nearest normal
-    does not plainly say so are asked exactly.
+    Opposite the inside of the skin's triangles their normals tell the side. Opposite sides and corners most points are
+    expected within, or outside where ``surface`` is but a piece of a ``whole``, which may turn back on itself: only where
+    the smooth normal does not plainly say so, the winding number is asked.
     """
     found = surface.closest(points, reach)
     depth = np.where(found.found, found.distance, reach)
     near = np.flatnonzero(found.found)
-    rise = np.einsum("ij,ij->i", points[near] - found.points[near], found.normals[near])
+    off = points[near] - found.points[near]
+    facing = (found.weights[near].min(axis=1) > 1e-6) & (whole is None)
+    normal = np.where(facing[:, None], surface.face_normals[found.triangle[near]], found.normals[near])
+    rise = np.einsum("ij,ij->i", off, normal)
     inner = np.full(len(points), whole is None)
-    ask = near[rise > -0.3 * np.minimum(found.distance[near], SURE)] if whole is None else near[rise < 0]
+    inner[near[facing]] = rise[facing] < 0
+    plain = rise < -0.3 * np.minimum(found.distance[near], SURE) if whole is None else rise > 0
+    ask = near[~facing & ~plain]
     solid = surface if whole is None else whole
     inner[ask] = winding_number(points[ask], solid.vertices, solid.triangles) > 0.5
     return np.where(inner, depth, -depth), found
