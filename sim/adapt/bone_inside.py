@@ -10,7 +10,6 @@ from .skin_cover import SkinCover
 from .smooth_system import factorised, laplacian
 
 FREE = 3.0  # mm: what is deeper by this than it must be, stays so
-CLOSE = 1.0  # mm: the same once it has been looked at
 SLACK, MORE = 0.05, 0.06  # mm: so much may lack, so much more is asked for than lacks
 #: Weight of what is asked against the bending of the bone, its growth from round to round, and where that ends.
 FIRM, FIRMER, FIRMEST = 4.0, 3.0, 400.0
@@ -29,7 +28,6 @@ def keep_inside(bone: Mesh, cover: SkinCover, least, rounds: int = 12) -> np.nda
     smooth = (bend.T @ bend + 0.02 * identity(n)).tocsr()
     look = vstack([identity(n), middles(bone.triangles, n)]).tocsr()
     need = np.concatenate([least, np.minimum(least[bone.triangles].min(axis=1), THIN)])
-    asked = Asked(look, len(cover.points))
     above = np.arange(len(cover.points))
     lack = cover.push(start, need[:n])[1]
     there = lack > -FREE  # what is that much deeper than it must be, stays so
@@ -37,17 +35,23 @@ def keep_inside(bone: Mesh, cover: SkinCover, least, rounds: int = 12) -> np.nda
         return start
     triangles = bone.triangles[there[bone.triangles].any(axis=1)]
     watch = np.concatenate([np.flatnonzero(there), n + np.flatnonzero(there[bone.triangles].any(axis=1))])
+    look, need = look[watch], need[watch]
+    asked = Asked(look, len(cover.points))
+    lack, checked = np.full(len(watch), np.inf), np.zeros((len(watch), 3))
     moved = start
     for _ in range(rounds):
-        push, lack = cover.push(look[watch] @ moved, need[watch])
+        now = look @ (moved - start)
+        # A place that went on by less than it has to spare needs no other look.
+        again = np.flatnonzero(lack + np.linalg.norm(now - checked, axis=1) > -SLACK)
+        push, lack[again] = cover.push(look[again] @ start + now[again], need[again])
+        checked[again] = now[again]
         wrong = np.linalg.norm(push, axis=1) > SLACK
         above, corners, weights, pull = cover.pull(bone.moved(moved), triangles, above, least)
         wants = np.linalg.norm(pull, axis=1) > SLACK
         if not wrong.any() and not wants.any():
             break
-        asked.places(watch[wrong], longer(push[wrong]), moved - start)
+        asked.places(again[wrong], longer(push[wrong]), now)
         asked.over(above[wants], corners[wants], weights[wants], longer(pull[wants]), moved - start)
-        watch = watch[lack > -CLOSE]
         rows, weight, goal = asked.system()
         moved = start + factorised((smooth + rows.T @ weight @ rows).tocsc())(rows.T @ (weight @ goal))
     return moved
@@ -66,11 +70,11 @@ class Asked:
         self.corners, self.shares = np.zeros((over, 3), dtype=np.int64), np.zeros((over, 3))
 
     def places(self, rows, push, so_far):
-        """Places ``rows`` of the bone must go on by ``push`` (r, 3) mm from where ``so_far`` (n, 3) mm took them."""
-        self._ask(rows, self.look[rows] @ so_far + push)
+        """Places ``rows`` of the bone must go on by ``push`` (r, 3) mm from where displacements (p, 3) took them all."""
+        self._ask(rows, so_far[rows] + push)
 
     def over(self, rows, corners, shares, push, so_far):
-        """The same for the points of the bone that lie nearest to places ``rows`` of the skin."""
+        """The same for the points of the bone that lie nearest to places ``rows`` of the skin; so_far (n, 3) mm."""
         self.corners[rows], self.shares[rows] = corners, shares
         self._ask(self.look.shape[0] + rows, np.einsum("rk,rkx->rx", shares, so_far[corners]) + push)
 
