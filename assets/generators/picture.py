@@ -27,7 +27,8 @@ class Layer:
 
     lines : (l, 2, 3) mm segments drawn on the surface, hidden where something lies in front
     ink : (3,) or (l, 3) colour of the lines
-    gloss : strength of the highlight
+    gloss, polish : strength of the highlight, (n,) or one, and how narrow it is
+    cover : share of what is behind that the layer hides; below 1 it is glass, drawn over all else
     ink_share : how much of what is under a line it covers, 0..1
     """
 
@@ -36,46 +37,77 @@ class Layer:
     colour: np.ndarray
     lines: np.ndarray | None = None
     ink: np.ndarray = field(default_factory=lambda: np.array([0.12, 0.08, 0.07]))
-    gloss: float = 0.12
+    gloss: np.ndarray | float = 0.12
+    polish: float = 40.0
+    cover: float = 1.0
     ink_share: float = 0.65
 
 
 def draw(layers: list[Layer], view: Viewpoint) -> np.ndarray:
     """(h, w, 3) sRGB 0..1 of all layers seen together; anti-aliased by drawing at twice the size."""
     fine = Viewpoint(view.centre, view.axes, 2 * view.focal, 2 * view.width, 2 * view.height)
+    image = np.empty((fine.height, fine.width, 3))
+    image[:] = PAGE
+    depth, where, diffuse, shine, _ = _lit([each for each in layers if each.cover == 1], fine)
+    image[where] = _srgb(diffuse + shine)
+    for each in layers:
+        if each.lines is not None and len(each.lines):
+            _ink(image, fine, depth, each)
+    for each in layers:
+        if each.cover < 1:
+            near, where, diffuse, shine, facing = _lit([each], fine)
+            front = near[where] < depth[where]
+            where[where] = front
+            behind = image[where] ** 2.2
+            cover = each.cover + (1 - each.cover) * (1 - facing[front, None]) ** 3  # glass hides more at a slant
+            image[where] = _srgb(behind + cover * (diffuse[front] - behind) + shine[front])
+    return image.reshape(view.height, 2, view.width, 2, 3).mean(axis=(1, 3))
+
+
+def _srgb(linear):
+    return np.clip(linear, 0, 1) ** (1 / 2.2)
+
+
+def _lit(layers: list[Layer], view: Viewpoint):
+    """Depth map (h, w), where there is anything (h, w) bool, and there the diffuse light, the highlights (k, 3)
+    and how squarely the surface is seen (k,) 0..1."""
+    if not layers:
+        none = np.zeros((0, 3))
+        return (
+            np.full((view.height, view.width), np.inf),
+            np.zeros((view.height, view.width), dtype=bool),
+            none,
+            none,
+            none[:, 0],
+        )
     start = np.cumsum([0] + [len(each.vertices) for each in layers])
     vertices = np.concatenate([each.vertices for each in layers])
     triangles = np.concatenate([each.triangles + s for each, s in zip(layers, start[:-1], strict=True)])
     normals = np.concatenate([vertex_normals(each.vertices, each.triangles) for each in layers])
     colours = np.concatenate([np.broadcast_to(each.colour, each.vertices.shape) for each in layers])
-    gloss = np.concatenate([np.full(len(each.vertices), each.gloss) for each in layers])
-    seen = depth_map(fine, vertices, triangles)
+    gloss, polish = (
+        np.concatenate([np.broadcast_to(getattr(each, name), len(each.vertices)) for each in layers]).astype(float)
+        for name in ("gloss", "polish")
+    )
+    seen = depth_map(view, vertices, triangles)
     where = seen.triangle >= 0
-    image = np.empty((fine.height, fine.width, 3))
-    image[:] = PAGE
-    if where.any():
-        n = seen.sample(normals, triangles, where) @ fine.axes.T
-        n /= np.maximum(np.linalg.norm(n, axis=1, keepdims=True), 1e-9)
-        away = n[:, 2] > 0.05
-        n = np.where(n[:, 2:] > 0, -n, n)
-        shade = np.full((len(n), 3), 0.24)
-        shine = np.zeros((len(n), 3))
-        for direction, tint, strength in LIGHTS:
-            d = np.array(direction) / np.linalg.norm(direction)
-            shade += strength * np.clip(n @ d, 0, None)[:, None] * tint
-            half = d + [0, 0, -1]
-            half /= np.linalg.norm(half)
-            shine += strength * np.clip(n @ half, 0, None)[:, None] ** 40 * tint
-        shade *= _open_sky(seen.depth)[where][:, None]
-        colour = seen.sample(colours, triangles, where)
-        lit = colour**2.2 * shade * 1.25 + seen.sample(gloss, triangles, where)[:, None] * shine
-        lit[away] *= [0.9, 0.45, 0.45]  # the inside of a surface shows red
-        image[where] = np.clip(lit, 0, 1) ** (1 / 2.2)
-    for each in layers:
-        if each.lines is not None and len(each.lines):
-            _ink(image, fine, seen.depth, each)
-    small = image.reshape(view.height, 2, view.width, 2, 3).mean(axis=(1, 3))
-    return small
+    n = seen.sample(normals, triangles, where) @ view.axes.T
+    n /= np.maximum(np.linalg.norm(n, axis=1, keepdims=True), 1e-9)
+    away = n[:, 2] > 0.5
+    n = np.where(n[:, 2:] > 0, -n, n)
+    narrow = seen.sample(polish, triangles, where)[:, None]
+    shade = np.full((len(n), 3), 0.24)
+    shine = np.zeros((len(n), 3))
+    for direction, tint, strength in LIGHTS:
+        d = np.array(direction) / np.linalg.norm(direction)
+        shade += strength * np.clip(n @ d, 0, None)[:, None] * tint
+        half = d + [0, 0, -1]
+        half /= np.linalg.norm(half)
+        shine += strength * np.clip(n @ half, 0, None)[:, None] ** narrow * tint
+    shade *= _open_sky(seen.depth)[where][:, None]
+    lit = seen.sample(colours, triangles, where) ** 2.2 * shade * 1.25
+    lit[away] *= [0.9, 0.45, 0.45]  # the inside of a surface shows red
+    return seen.depth, where, lit, seen.sample(gloss, triangles, where)[:, None] * shine, -n[:, 2]
 
 
 def _open_sky(depth: np.ndarray) -> np.ndarray:

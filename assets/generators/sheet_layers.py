@@ -12,6 +12,7 @@ from .muscles import rows
 from .picture import Layer
 
 TENDON = np.array([0.86, 0.78, 0.70])
+CONJUNCTIVA = np.array([0.79, 0.50, 0.46])
 LIP, LINING = np.array([0.74, 0.40, 0.37]), np.array([0.55, 0.22, 0.21])
 SKIN, BONE, JAW = np.array([0.84, 0.64, 0.54]), np.array([0.88, 0.84, 0.74]), np.array([0.70, 0.78, 0.88])
 
@@ -21,27 +22,37 @@ COLOURS = {
     "gum": (0.78, 0.42, 0.42),
     "tongue": (0.76, 0.38, 0.38),
     "bone": BONE,
-    "sclera": (0.93, 0.91, 0.89),
+    "sclera": (0.88, 0.86, 0.84),
     "iris": (0.36, 0.26, 0.16),
-    "pupil": (0.02, 0.02, 0.02),
-    "cornea": (0.9, 0.95, 1.0),
-    "caruncle": (0.85, 0.5, 0.48),
+    "pupil": (0.015, 0.015, 0.015),
+    "cornea": (0.55, 0.56, 0.58),
+    "caruncle": (0.80, 0.50, 0.47),
 }
+
+#: Wet things are glossier than others; iris and pupil lie behind the cornea and are dull.
+GLOSS = {"iris": 0.02, "pupil": 0.0}
 
 
 def skin_layer(mesh: Mesh, wire: bool = False, levels: int = 2, groups: dict | None = None) -> Layer:
-    """The skin's limit surface, with the edges of the cage drawn on it for ``wire``; lips red where groups are given."""
+    """The skin's limit surface, with the edges of the cage drawn on it for ``wire``.
+
+    groups : the head's, for red lips and lid backs
+    """
     n = len(mesh.vertices)
     operator, quads, _ = subdivision(mesh.faces, n, levels)
     operator = limit(quads, operator.shape[0]) @ operator
     smooth = operator @ mesh.vertices
     lines = smooth[_cage_lines(mesh.faces, n, levels)] if wire else None
-    colour = SKIN
+    colour, gloss = SKIN, 0.12
     if groups is not None:
         lip = np.clip((operator @ np.maximum(groups["lip_upper"], groups["lip_lower"]) - 0.7) / 0.25 + 0.5, 0, 1)
         colour = SKIN + lip[:, None] * (LIP - SKIN)
         colour = colour + np.clip(operator @ groups["mouth_bag"], 0, 1)[:, None] * (LINING - colour)
-    return Layer(smooth, Mesh(smooth, quads).triangles, colour, lines)
+        lids = np.max([groups[f"lid_{lid}_{side}"] for lid in ("upper", "lower") for side in "lr"], axis=0)
+        wet = np.clip((operator @ (groups["inner"] * (lids > 0)) - 0.02) / 0.2, 0, 1)
+        colour = colour + wet[:, None] * (CONJUNCTIVA - colour)
+        gloss = 0.12 + 0.6 * wet
+    return Layer(smooth, Mesh(smooth, quads).triangles, colour, lines, gloss=gloss)
 
 
 def _cage_lines(faces: np.ndarray, n: int, levels: int) -> np.ndarray:
@@ -68,12 +79,24 @@ def part_layer(head: Head, part: str, colour=None) -> Layer:
         of, n = np.repeat(np.arange(len(faces)), corner.sum(axis=1)), len(mesh.vertices)
         count = np.maximum(np.bincount(faces[corner], minlength=n), 1)
         colour = np.stack([np.bincount(faces[corner], tint[of, k], minlength=n) / count for k in range(3)], axis=1)
-    return Layer(mesh.vertices, Mesh(mesh.vertices, faces).triangles, colour, gloss=0.25)
+    gloss = np.full(len(mesh.vertices), 0.25)
+    for name, amount in GLOSS.items():
+        if name in names:
+            gloss[mesh.faces[material == names.index(name)].clip(min=0)] = amount
+    return Layer(mesh.vertices, Mesh(mesh.vertices, faces).triangles, colour, gloss=gloss, polish=90.0)
 
 
 def eye_layers(head: Head) -> list[Layer]:
-    """Both eyeballs without their corneas."""
-    return [part_layer(head, f"eye_{side}") for side in "lr"]
+    """Both eyeballs, and the corneas as glass before them."""
+    return [part_layer(head, f"eye_{side}") for side in "lr"] + [cornea_layer(head, side) for side in "lr"]
+
+
+def cornea_layer(head: Head, side: str) -> Layer:
+    """The clear cornea of one eye: little but its highlight."""
+    mesh = head.parts[f"eye_{side}"]
+    faces = mesh.faces[mesh.material == MATERIALS[f"eye_{side}"].index("cornea")]
+    colour = np.array(COLOURS["cornea"])
+    return Layer(mesh.vertices, Mesh(mesh.vertices, faces).triangles, colour, gloss=0.9, polish=400.0, cover=0.02)
 
 
 def mouth_layers(head: Head) -> list[Layer]:

@@ -21,6 +21,7 @@ from .picture import Layer, draw, montage, write_png
 from .sheet_layers import (
     SKIN,
     bone_layers,
+    cornea_layer,
     eye_layers,
     feature_layer,
     mark_layer,
@@ -157,7 +158,13 @@ class Sheets:
 
     def eyeballs(self):
         """The left eyeball by itself."""
-        return montage([self._row([part_layer(self.head, "eye_l")], self.head.eyes[0].centre, 32, FOUR)])
+        return montage(
+            [
+                self._row(
+                    [part_layer(self.head, "eye_l"), cornea_layer(self.head, "l")], self.head.eyes[0].centre, 32, FOUR
+                )
+            ]
+        )
 
     def poses(self):
         """Jaw and lids turned plainly, without simulation: shut, half, wide open."""
@@ -174,7 +181,7 @@ class Sheets:
         rows = []
         for blink, gaze in ((0, (0, 0)), (0.5, (0, 0)), (1, (0, 0)), (0, (0, -0.43)), (0, (0, 0.3)), (0, (0.6, 0))):
             posed = plainly_posed(self.head, blink=blink, gaze=gaze)
-            layers = [skin_layer(posed.skin, levels=3), *eye_layers(posed)]
+            layers = [skin_layer(posed.skin, levels=3, groups=posed.groups), *eye_layers(posed)]
             rows.append(self._row(layers, self.head.eyes[0].centre, 46, ((0, 0), (45, 0), (-35, 5), (10, -35))))
         return montage(rows)
 

@@ -22,6 +22,7 @@ LIES = (0.18, 0.94)  # along an eye from its inner corner: where the inner edge 
 CORNERS, FADE = (0.06, 1.12), 0.12  # along an eye from its inner corner: where lids lie on the ball; fading in and out
 BESIDE = (0.7, 0.35)  # how much of that holds for the seen lid one and two edges beside the rim
 CLOSE = 0.5  # share of the reference's room around the caruncle that is enough
+ORBIT = (1.5, 2.8)  # radii of an eye from its centre: bone that goes with it, and bone that stays
 AROUND_CARUNCLE = 4.0  # mm: lids and eyeball this near carry it
 OUTSIDE = 0.8  # mm of lid between eyeball and seen skin, at least, where the reference has as much
 
@@ -70,6 +71,13 @@ def place_eye(eye: Eye, warped, reference_skin, fitted_skin, lid, inner, scale: 
 def _moved(eye, centre, radius, gaze):
     grow = radius / eye.radius
     return Eye(centre, radius, gaze, eye.iris_radius * grow, eye.pupil_radius * grow)
+
+
+def with_orbit(bone, eye: Eye, shift) -> np.ndarray:
+    """Bone (n, 3) mm whose orbit went with the ``eye`` when the lids moved that by ``shift`` (3,) mm from its old place."""
+    off = np.linalg.norm(bone - (eye.centre - shift), axis=1) / eye.radius
+    share = np.clip((ORBIT[1] - off) / (ORBIT[1] - ORBIT[0]), 0, 1)
+    return bone + (share * share * (3 - 2 * share))[:, None] * shift
 
 
 def eye_similarity(old: Eye, new: Eye, turn):

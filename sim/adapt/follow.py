@@ -60,13 +60,15 @@ def follow(reference: Head, skin: np.ndarray, unseen: np.ndarray | None = None) 
     parts = {name: with_teeth(rest, name, moved, mouth) for name, moved in parts.items()}
 
     yield Progress(0.25, "Eyes and teeth")
-    eyes, carried = [], {"mouth": mouth}
+    eyes, carried, skull = [], {"mouth": mouth}, parts["skull"]
     for k, side in enumerate("lr"):
         old = reference.eyes[k]
         around = near_bone(rest, parts, old.centre[None], AROUND_EYE)
         new, turn = eyeballs.place_eye(old, around, start, skin, rest.lids(side), rest.inner, scale)
         eyes.append(new)
+        skull = eyeballs.with_orbit(skull, new, new.centre - around(old.centre[None])[0])
         carried[f"eye_{side}"] = eyeballs.eye_similarity(old, new, turn)
+    parts["skull"] = skull
     for name in (*TEETH, "tongue"):
         parts[name] = mouth(reference.parts[name].vertices)
 

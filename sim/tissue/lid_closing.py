@@ -13,6 +13,8 @@ from .structures import Lids
 LOWER_SHARE, SHARES = 0.12, (0.1, 0.6)
 #: mm over the ball of the seen lid when shut, at least.
 PLATE = 1.2
+#: Rounds in which the reliefs of neighbouring strips are evened out.
+EVEN = 2
 
 
 def lower_share(along, corners, upper, lower, radius: float) -> np.ndarray:
@@ -38,11 +40,12 @@ def lower_share(along, corners, upper, lower, radius: float) -> np.ndarray:
     return np.clip((arc - low) / np.maximum(high - low, 0.5), *SHARES)
 
 
-def relief(lids: Lids, shut: np.ndarray, root, length, reach) -> np.ndarray:
+def relief(lids: Lids, shut: np.ndarray, root, length, pair, reach) -> np.ndarray:
     """(v, 3) mm to add to where plain turning puts the seen skin of shut lids.
 
     shut : (v, 3) mm, the lids as plain turning shuts them
     root, length : strip across the lid of each vertex, and mm along it from the margin (`lid_edges.strips`)
+    pair : (e, 2) edges between lid vertices
     reach : callable, points (k, 3) mm -> mm from the eye's centre to the ball's surface there
     """
     out = np.zeros_like(shut)
@@ -90,6 +93,13 @@ def relief(lids: Lids, shut: np.ndarray, root, length, reach) -> np.ndarray:
     world = lids.eye.centre + away * (np.maximum(far, least) / far)[:, None]
     # the lower lid only closes ranks at its edge
     share = np.where(lids.upper[rows], 1.0, (t[:, 0] == 0).astype(float))
-    share = share * lids.middle[rows]
-    out[rows] = share[:, None] * (world - shut[rows])
+    out[rows] = (share * np.clip(1.5 * lids.middle[rows], 0, 1))[:, None] * (world - shut[rows])
+    # evenly from strip to strip
+    beside = pair[seen[pair].all(axis=1) & (root[pair[:, 0]] != root[pair[:, 1]])]
+    count = np.maximum(np.bincount(beside.ravel(), minlength=len(out)), 1)[:, None]
+    for _ in range(EVEN):
+        total = np.zeros_like(out)
+        np.add.at(total, beside[:, 0], out[beside[:, 1]])
+        np.add.at(total, beside[:, 1], out[beside[:, 0]])
+        out += seen[:, None] * 0.5 * (total / count - out)
     return out

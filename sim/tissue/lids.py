@@ -145,7 +145,10 @@ def build_lids(head: Head, layers: Layers, side: str) -> Lids | None:
     if opening.max() <= 0 or len(surface.rows) < 8:
         return lids
     flat = lid_targets(lids, 1.0, 1.0, np.zeros(2))
-    spread = relief(lids, flat, root, length, lambda points: eyeball_radius(lids, points, np.zeros(2)))
+    row = np.full(len(v), -1)
+    row[column] = np.arange(len(column))
+    near = row[pair][(row[pair] >= 0).all(axis=1)]
+    spread = relief(lids, flat, root, length, near, lambda points: eyeball_radius(lids, points, np.zeros(2)))
     lids = replace(lids, relief=spread)
     return replace(lids, seal=_seal(lids, head, surface, within))
 
