@@ -10,9 +10,11 @@ from headshop.sim.adapt.closest import Surface
 from headshop.sim.anatomy.inside import inside, winding_number
 from headshop.sim.anatomy.landmark_names import SKULL, mirrored
 from headshop.sim.anatomy.storage import load_head
+from headshop.sim.anatomy.teeth import crowns
 from headshop.sim.anatomy.tissue_depth import depths, skin_counterparts, skull_targets, tissue_vectors
 from headshop.sim.health.topology import closed, volume
 from headshop.sim.mesh import Mesh
+from headshop.sim.mesh_piercing import piercings
 from headshop.sim.tissue.jaw import jaw_transform, opening_mm
 
 CUBE = Mesh(
@@ -268,3 +270,17 @@ def test_thicker_tissue_moves_bone_inward(head):
         np.testing.assert_allclose(thick[name], bone[name] - 0.5 * vectors[name], atol=1e-9)
     np.testing.assert_allclose(chin["pg"], bone["pg"] - vectors["pg"], atol=1e-9)
     np.testing.assert_allclose(chin["g"], bone["g"], atol=1e-9)
+
+
+@pytest.mark.parametrize("pose", [(0, 0.3, 0), (0, 1, 0), (0, -1, 0), (0, 0, 0.5), (0, 0, -1)])
+def test_teeth_guide_the_jaw_past_each_other(head, pose):
+    rotation, translation = jaw_transform(head.jaw, *pose)
+    upper, lower = (crowns_alone(head.parts[part]) for part in ("teeth_upper", "teeth_lower"))
+    moved = lower.vertices @ rotation.T + translation
+    assert len(piercings(upper.vertices, upper.triangles, moved, lower.triangles)) == 0
+
+
+def crowns_alone(mesh):
+    crown = crowns(mesh)
+    crown[mesh.faces[mesh.material != 0].clip(min=0).ravel()] = False
+    return Mesh(mesh.vertices, mesh.faces[crown[mesh.faces].all(axis=1) & (mesh.faces[:, 3] >= 0)])

@@ -105,7 +105,7 @@ class Jaw:
     incisor: np.ndarray
     open_max: float = 0.45
     slide_max: float = 11.9
-    side_max: float = 9.0
+    side_max: float = 8.5
     forward_max: float = 8.0
 
 

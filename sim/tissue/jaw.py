@@ -15,8 +15,11 @@ from ..anatomy.head import Jaw
 _PATH_SLOPE = np.radians(38.0)
 #: Shift of the working condyle, a share of the whole motion to the side (Bennett).
 _BENNETT = 0.12
-#: From its rest the jaw goes back by this share of what it goes forward: about 1 mm.
-_BACKWARD = 0.12
+#: From its rest the jaw goes back by this share of what it goes forward: a little less than 1 mm, and level.
+_BACKWARD = 0.1
+#: Teeth guide the jaw out of their bite: mm by which the incisors go down beside the condyles' own path, at most, on
+#: the way forward, back and aside.
+_GUIDE = (1.0, 0.85, 2.5)
 
 
 def _rotation(axis: np.ndarray, angle: float) -> np.ndarray:
@@ -41,8 +44,10 @@ def jaw_transform(jaw: Jaw, opening: float, forward: float = 0.0, side: float = 
     ``side_max``, positive to the left. More than the joint gives is not given.
     """
     opening, forward, side = np.clip(opening, 0, 1), np.clip(forward, -1, 1), np.clip(side, -1, 1)
-    forward = (forward if forward > 0 else _BACKWARD * forward) * (1 - opening)
-    side = side * np.sqrt(1 - opening**2)
+    forward *= 1 - opening
+    side *= np.sqrt(1 - opening**2)
+    ahead_of, back_of, aside = max(forward, 0.0), max(-forward, 0.0), abs(side)
+    guide = np.dot(_GUIDE, [4 * ahead_of * (1 - ahead_of), back_of, aside * (2 - aside)]) * (1 - opening)
     across = jaw.condyle_l - jaw.condyle_r
     width = np.linalg.norm(across)
     axis = across / width  # to the subject's left
@@ -56,10 +61,11 @@ def jaw_transform(jaw: Jaw, opening: float, forward: float = 0.0, side: float = 
     front = ahead - (ahead @ up) * up
     front /= np.linalg.norm(front)
     path = np.cos(_PATH_SLOPE) * front - np.sin(_PATH_SLOPE) * up
-    rotation = _rotation(axis, float(opening) * jaw.open_max)
+    rotation = _rotation(axis, float(opening * jaw.open_max + guide / np.linalg.norm(ahead)))
     if (rotation @ ahead - ahead) @ up > 0:  # opening lowers the incisors, whichever way the axis points
         rotation = rotation.T
-    shift = (jaw.slide_max * opening**1.7 + jaw.forward_max * forward) * path
+    shift = (jaw.slide_max * opening**1.7 + jaw.forward_max * ahead_of) * path
+    shift -= _BACKWARD * jaw.forward_max * back_of * front
     translation = pivot + shift - rotation @ pivot
     if side == 0:
         return rotation, translation
