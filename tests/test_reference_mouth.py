@@ -165,10 +165,18 @@ def test_chin_is_rigid_and_the_rest_stays(made):
 def posed_skin(made, pose):
     shipped = load_head()
     skin = Mesh(made.vertices, made.layout.faces)
-    return plainly_posed(replace(shipped, parts={**shipped.parts, "skin": skin}, groups=made.groups), **pose).skin
+    head = replace(shipped, parts={**shipped.parts, "skin": skin}, groups=made.groups)
+    return plainly_posed(head, **pose).skin
 
 
-@pytest.mark.parametrize("pose", [{"jaw_open": k} for k in (0.2, 0.5, 0.8, 0.9, 1.0)])
+POSES = [
+    *({"jaw_open": k} for k in (0.2, 0.5, 0.8, 0.9, 1.0)),
+    *({"jaw_side": k} for k in (0.3, 1.0)),
+    *({"jaw_forward": k} for k in (0.3, 1.0, -1.0)),
+]
+
+
+@pytest.mark.parametrize("pose", POSES)
 def test_no_part_of_the_skin_goes_through_another(made, pose):
     """Throat and lining too, the cage and the surface drawn of it."""
     posed = posed_skin(made, pose)

@@ -14,6 +14,11 @@ from ..tissue.layers import build_layers
 from ..tissue.lids import build_lids, gaze_rotation, lid_targets
 from ..tissue.parameters import DEFAULT
 
+#: Share of the jaw's way aside that the lips go together: in the middle, and how much more at the corner the jaw goes
+#: to, less at the other. The lining there is pushed along by the teeth, the more the less it belongs to either jaw.
+_LIPS_ASIDE, _CORNER_ASIDE = 0.48, 0.3
+_PUSHED, _PUSH = 0.9, 1.2
+
 
 def plainly_posed(
     head: Head, jaw_open=0.0, jaw_forward=0.0, jaw_side=0.0, blink: float | tuple[float, float] = 0.0, gaze=(0.0, 0.0)
@@ -27,16 +32,20 @@ def plainly_posed(
     gaze : (left, up) rad
 
     Every skin vertex turns about the hinge by its own share of the angle, so that nothing shrinks toward the axis as in
-    linear blending.
+    linear blending. Aside the lips slide along the teeth without parting.
     """
     vertices = {name: mesh.vertices for name, mesh in head.parts.items()}
     rotation, translation = jaw_transform(head.jaw, jaw_open, jaw_forward, jaw_side)
     for part in JAW_PARTS:
         vertices[part] = vertices[part] @ rotation.T + translation
+    share = np.asarray(head.groups["jaw"], float)
     pivot = (head.jaw.condyle_l + head.jaw.condyle_r) / 2
-    share = np.asarray(head.groups["jaw"], float)[:, None]
-    turn = Rotation.from_rotvec(share * Rotation.from_matrix(rotation).as_rotvec())
-    skin = turn.apply(head.skin.vertices - pivot) + pivot + share * (translation + rotation @ pivot - pivot)
+    first = jaw_transform(head.jaw, jaw_open, jaw_forward)
+    skin = _turned(head.skin.vertices, share, *first, pivot)
+    if jaw_side:
+        rest = rotation @ first[0].T  # from there to the whole
+        pivot, rest_shift = first[0] @ pivot + first[1], translation - rest @ first[1]
+        skin = _turned(skin, _aside(head, share, np.sign(jaw_side)), rest, rest_shift, pivot)
     shut = np.broadcast_to(np.asarray(blink, float), (2,))
     gaze = np.asarray(gaze, float)
     if shut.any() or gaze.any():
@@ -50,3 +59,21 @@ def plainly_posed(
         part = f"eye_{side}"
         vertices[part] = turned_eye(vertices[part], eye.centre, around)
     return head.with_vertices({**vertices, "skin": skin})
+
+
+def _turned(points, share, rotation, translation, pivot):
+    """Points (n, 3) mm moved by ``share`` (n,) of a rigid motion: of its angle about the axis through ``pivot``."""
+    share = share[:, None]
+    turn = Rotation.from_rotvec(share * Rotation.from_matrix(rotation).as_rotvec())
+    return turn.apply(points - pivot) + pivot + share * (translation + rotation @ pivot - pivot)
+
+
+def _aside(head: Head, share: np.ndarray, side: float) -> np.ndarray:
+    """(n,) share of the jaw's motion to the ``side`` (1 left, -1 right): lips slide along the teeth without parting."""
+    lips = np.minimum(head.groups["lip_upper"] + head.groups["lip_lower"], 1)
+    across = side * head.skin.vertices[:, 0]
+    corner = np.abs(across[lips > 0.9]).max()
+    together = lips * (_LIPS_ASIDE + _CORNER_ASIDE * np.clip(across / corner, -1, 1) - share)
+    lining = head.groups["mouth_bag"] * (1 - lips) * np.clip((across / corner + 0.4) / 0.8, 0, 1)
+    pushed = lining * np.clip(6 * share * (1 - share), 0, 1) * np.clip(_PUSHED - share, 0, None)
+    return share + together + _PUSH * pushed
