@@ -12,13 +12,14 @@ from pathlib import Path
 import numpy as np
 
 from ...sim.anatomy.head import Eye, Jaw, Muscle
+from ...sim.anatomy.muscle_bounds import bounded, eased
 from ...sim.anatomy.muscle_room import Room
-from ...sim.anatomy.muscle_shape import half_thickness, muscle_shape
+from ...sim.anatomy.muscle_shape import belly_mesh, belly_on, half_thickness
 from ...sim.mesh import Mesh
 from .muscles_layers import MERGE, Layers
 from .muscles_points import BROW, BROW_NODES, MODIOLUS_NODES, grid_rows, left_points, point, shared_ends
 from .muscles_rings import lid_rings, lip_arcs, orbital_rings
-from .muscles_room import Tissue, evened
+from .muscles_room import Tissue, calmed, evened
 from .skull_depth import BoneSpace
 from .skull_field import curve
 
@@ -61,7 +62,7 @@ class _Maker:
         self.room = Room(skin, bones, np.asarray(groups["inner"]) > 0.5, [(e.centre, e.radius) for e in eyes])
         self.tissue = Tissue(self.room, skin, groups)
         self.points.update(self.tissue.lower_end())
-        self.layers = Layers(self.room)
+        self.layers = Layers()
         self.bones = dict(zip(("skull", "mandible"), self.room.bones, strict=True))
         self.palpebral = None
         self._shared_nodes()
@@ -88,12 +89,11 @@ class _Maker:
         fibres, keep, centre = self.fibres(row)
         if not paired:
             fibres, keep = _symmetric(fibres, row), np.minimum(keep, _mirrored(keep[..., None], row)[..., 0])
-        half, clear = self._half(row, fibres, ring)
         level = float(row["level"])
-        fibres = self.layers.settled(fibres, half, level, keep, clear, ring)
+        fibres = self.eased(row, fibres, keep, ring)
         if not paired:
             fibres = _symmetric(fibres, row)
-        shape = self._shape(row, fibres, keep, ring, level)
+        fibres, shape = self._laid(row, fibres, keep, ring, level)
         self.layers.add(level, shape, paired)
         width, thickness = float(row["width_mm"]), float(row["thickness_mm"])
         muscle = Muscle(row["name"], row["kind"], fibres, width, thickness, float(row["max_shortening"]),
@@ -116,25 +116,41 @@ class _Maker:
                 clear = clear * rise[::-1]
         return half, clear + 0.15
 
-    def _shape(self, row, fibres, keep, ring, level):
-        width, thickness = float(row["width_mm"]), float(row["thickness_mm"])
-        shape = muscle_shape(fibres, width, thickness, ring, self.room, _profile(row))
-        columns = 2 * len(fibres) - 1
-        stations = len(shape.vertices) // (2 * columns - 2)
-        fade = keep.min(axis=0)
-        fade = np.interp(np.arange(stations) / stations * len(fade), np.arange(len(fade)), fade)
+    def eased(self, row, fibres, keep, ring):
+        """Fibres bent clear of bone, lining and skin by some of their belly, and calm again; shared nodes stay."""
+        clear = 0.5 * self._half(row, fibres, ring)[1]
+        if row["kind"] == "sphincter":  # laid along an edge: walls all round would drive it back from there
+            clear = np.minimum(clear, 0.1)
+        beside = 1.0 if row["depth"] == "deep" else 0.25
         for _ in range(2):
-            shape = self.layers.undercut(shape, columns, stations, level, fade)
-            shape = shape.moved(self.room.fitted(shape.vertices))
+            bent = eased([fibres], [keep], [clear], [ring], self.room, rounds=4, beside=beside)[0]
+            bent = bent if ring else calmed(bent, (bent.shape[1] + 3) // 2)
+            fibres = held(bent, fibres, keep)
+        return fibres
+
+    def _laid(self, row, fibres, keep, ring, level):
+        """The fibres in the middle of their belly, and its surface, in its room and over what lies deeper."""
+        width, thickness = float(row["width_mm"]), float(row["thickness_mm"])
+        fade = np.interp(np.arange(_stations(fibres, ring)) / 2, np.arange(keep.shape[1]), keep.min(axis=0))
+        for rounds in (2, 2, 4):
+            belly = replace(belly_on(fibres, width, thickness, ring, self.room, _profile(row)), free=fade)
+            belly = bounded([belly], self.room, rounds, self.layers.floor(level), _cover(level), rounds == 4)[0]
+            if rounds == 2:
+                fibres = fibres + keep[..., None] * (belly.middle[::2, ::2] - fibres)
+                fibres = self.eased(row, fibres, keep, ring)
+                if row["paired"] != "1":
+                    fibres = _symmetric(fibres, row)
+        shape = belly_mesh(belly)
         if row["paired"] == "1":
-            return shape
+            return fibres, shape
+        columns, stations = belly.top.shape[:2]
         rings = shape.vertices.reshape(stations, 2 * columns - 2, 3)
         if row["kind"] == "sphincter":
             other = rings[::-1]
         else:
             turn = np.concatenate([np.arange(columns)[::-1], np.arange(columns, 2 * columns - 2)[::-1]])
             other = rings[:, turn]
-        return shape.moved(((rings + other * MIRROR) / 2).reshape(-1, 3))
+        return fibres, shape.moved(((rings + other * MIRROR) / 2).reshape(-1, 3))
 
     def _name_nodes(self, row, fibres):
         """Let others end in this muscle: the lips' fibres and the outermost of the lids' rings."""
@@ -180,10 +196,10 @@ class _Maker:
                     continue
                 down = depth[token] if token in depth else np.maximum(float(token) * deep, half + 0.8)
                 placed += share * (feet - down[..., None] * normal)
-        placed = self._rooted(placed, row)
+        placed = calmed(self._rooted(placed, row), len(corners) + 1)
         nodes = shared_ends(text, count)
         keep = np.ones(lines.shape[:2])
-        fade = np.clip((np.linspace(0, 1, steps) - 0.55) / 0.45, 0, 1)[:, None] ** 2
+        fade = _eased(np.linspace(0, 1, steps))[:, None]
         for k, name in enumerate(nodes):
             if name is not None:
                 placed[k] += fade * (self.points[name] - placed[k, -1])
@@ -198,9 +214,9 @@ class _Maker:
         for part, end in ((row["origin_part"], 0), (row["insertion_part"], -1)):
             if part not in self.bones:
                 continue
-            bone = self.bones[part][0]
+            bone = self.bones[part]
             at = fibres[:, end]
-            _, _, far = bone.height(at, reach)
+            far = np.abs(bone.height(at, reach)[0])
             shift = np.where((np.isfinite(far) & (far > 3.0))[:, None], bone.nearest(at) - at, 0.0)
             shift = evened(shift[:, None], 2)[:, 0] if len(shift) > 2 else shift
             fade = np.clip(1 - np.linspace(0, 1, fibres.shape[1]) / 0.45, 0, 1) ** 2
@@ -217,6 +233,29 @@ def _fading(fibres, first, last):
         if wanted:
             out = np.minimum(out, np.clip(away / MERGE, 0, 1))
     return out
+
+
+def _cover(level):
+    """mm that a muscle of this ``level`` leaves to those over it."""
+    return float(np.interp(level, (1.0, 1.5, 2.0, 2.5, 3.0), (1.2, 0.5, 0.8, 0.6, 0.0)))
+
+
+def _stations(fibres, ring):
+    return 2 * fibres.shape[1] - (not ring)
+
+
+def held(fibres, ends, keep):
+    """Fibres (f, p, 3) drawn to where ``ends`` (f, p, 3) end wherever an end is shared (``keep`` (f, p) is 0)."""
+    t = np.linspace(0, 1, fibres.shape[1])
+    for end, fade in ((0, _eased(1 - t)), (-1, _eased(t))):
+        shift = np.where((keep[:, end] <= 0)[:, None], ends[:, end] - fibres[:, end], 0.0)
+        fibres = fibres + fade[:, None] * shift[:, None]
+    return fibres
+
+
+def _eased(t):
+    """0 to 1 with no kink at either end."""
+    return t * t * (3 - 2 * t)
 
 
 def _profile(row):

@@ -5,7 +5,7 @@ import numpy as np
 
 from ...sim.anatomy.head import Eye
 from .muscles_points import point
-from .muscles_room import Tissue, evened
+from .muscles_room import Tissue, calmed
 from .skull_field import curve
 
 RING_POINTS, ARC_POINTS = 32, 17
@@ -85,13 +85,15 @@ def lip_arcs(text: str, count: int, points, tissue: Tissue, share: float) -> np.
     fibres = np.array(fibres)
     lines = tissue.front(fibres.reshape(-1, 3)).reshape(fibres.shape)
     lines[:, [0, -1]] = fibres[:, [0, -1]]
-    feet, normal, deep = tissue.painted(lines)
-    placed = feet - np.clip(share * deep, 1.6, 4.5)[..., None] * normal
+    lines = calmed(lines, 9)
+    level, deep = tissue.level(lines)
+    placed = lines - np.clip(share * deep, 1.6, 4.5)[..., None] * level
     ends = np.array([f[-1] for f in fibres])
     fade = np.clip((np.linspace(-1, 1, ARC_POINTS) ** 2 - 0.55) / 0.45, 0, 1)[None, :, None] ** 2
     shift = np.where(np.linspace(-1, 1, ARC_POINTS)[None, :, None] > 0, (ends - placed[:, -1])[:, None],
                      (ends * [-1, 1, 1] - placed[:, 0])[:, None])  # fmt: skip
-    placed = evened(placed + fade * shift, 1)
+    placed = calmed(placed + fade * shift, 9)
+    placed[:, 0], placed[:, -1] = ends * [-1, 1, 1], ends
     return (placed + placed[:, ::-1] * [-1, 1, 1]) / 2
 
 

@@ -2,6 +2,7 @@
 """The soft tissue as muscles are painted into it: the place on the skin, and how deep it is to bone there."""
 
 import numpy as np
+from scipy.interpolate import BSpline
 from scipy.spatial import cKDTree
 
 from ...sim.anatomy.muscle_room import Room, Samples, both_ways
@@ -56,20 +57,30 @@ class Tissue:
             lines = self.foot(lines.reshape(-1, 3))[0].reshape(shape)
             lines = evened(lines, 1)
         feet, normal = self.foot(lines.reshape(-1, 3))
-        normal = evened(normal.reshape(shape), 2, ends=False)
+        normal = evened(normal.reshape(shape), 5, ends=False)
         normal /= np.linalg.norm(normal, axis=2, keepdims=True)
         deep = self.thickness(feet, normal.reshape(-1, 3)).reshape(shape[:2])
-        return feet.reshape(shape), normal, evened(deep, 1, ends=False)
+        return feet.reshape(shape), normal, evened(deep, 4, ends=False)
+
+    def level(self, feet):
+        """Level outward directions (f, p, 3) of the skin at ``feet`` (f, p, 3), and the mm (f, p) of tissue there.
+
+        A lip's skin turns inward at its edge, what lies in the lip does not.
+        """
+        normal = self._skin.smooth_normal(feet.reshape(-1, 3), 40).reshape(feet.shape) * [1, 1, 0]
+        normal = evened(normal, 6, ends=False)
+        normal /= np.linalg.norm(normal, axis=2, keepdims=True)
+        deep = self.thickness(feet.reshape(-1, 3), normal.reshape(-1, 3)).reshape(feet.shape[:2])
+        return normal, evened(deep, 4, ends=False)
 
     def thickness(self, foot, normal):
         """(n,) mm from the skin inward to bone, or to the lining of mouth and nose."""
         steps = np.arange(1.0, 30.0, 0.75)
         ray = foot[:, None] - steps[None, :, None] * normal[:, None]
         flat = ray.reshape(-1, 3)
-        height = np.min([bone.about(flat) for bone, *_ in self._room.bones], axis=0).reshape(ray.shape[:2])
+        height = np.min([bone.about(flat) for bone in self._room.bones], axis=0).reshape(ray.shape[:2])
         hit = height < 0.0
-        for lining in self._room.linings[:1]:
-            hit |= (lining.height(flat, 1.2)[2] < 1.2).reshape(ray.shape[:2]) & (steps > 2)
+        hit |= self._room.near_lining(flat, 1.2).reshape(ray.shape[:2]) & (steps > 2)
         first = hit.argmax(axis=1)
         row = np.arange(len(foot))
         before = np.maximum(height[row, np.maximum(first - 1, 0)], 0)  # from the last step outside, as far as is left
@@ -90,3 +101,29 @@ def evened(values, rounds, ends=True):
             inner = slice(None) if not ends else slice(1, -1)
             values[1:-1, inner] = 0.5 * values[1:-1, inner] + 0.25 * (values[:-2, inner] + values[2:, inner])
     return values
+
+
+def calmed(fibres, rows: int, columns: int = 3, ends: float = 6.0):
+    """Fibres (f, p, 3) as the spline surface of ``rows`` by ``columns`` controls nearest to them.
+
+    ``ends``: how much more the first and the last point of a fibre weigh than one between.
+    """
+    f, p = fibres.shape[:2]
+    along, across = _splines(p, min(rows, p)), _splines(f, min(columns, f), degree=2)
+    weight = np.ones(p)
+    weight[[0, -1]] = ends
+    control = np.linalg.lstsq(weight[:, None] * along, (weight[:, None] * fibres.transpose(1, 0, 2).reshape(p, -1)),
+                              rcond=None)[0]  # fmt: skip
+    fibres = (along @ control).reshape(p, f, 3).transpose(1, 0, 2)
+    control = np.linalg.lstsq(across, fibres.reshape(f, -1), rcond=None)[0]
+    return (across @ control).reshape(fibres.shape)
+
+
+def _splines(count, controls, degree=3):
+    """(count, controls) B-splines of a clamped even knot vector, at even places."""
+    degree = min(degree, controls - 1)
+    if degree < 1:
+        return np.ones((count, 1))
+    inside = np.linspace(0, 1, controls - degree + 1)
+    knots = np.concatenate([np.zeros(degree), inside, np.ones(degree)])
+    return BSpline.design_matrix(np.linspace(0, 1, count), knots, degree).toarray()

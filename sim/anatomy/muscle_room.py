@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The soft tissue muscles live in: under the skin, outside bone, mouth and eyeballs (Kähler 2002, 5.2, item 3)."""
 
+from itertools import islice
+
 import numpy as np
 from scipy.spatial import cKDTree
 
@@ -10,61 +12,80 @@ from ..triangle_projection import closest_on_triangles
 #: mm between the points a surface is sampled by.
 SPACING = 1.6
 #: mm of skin kept over a muscle; how near it may come to the lining of mouth and lids, and to bone.
-SKIN_CLEAR, LINING_CLEAR, BONE_CLEAR, EYE_CLEAR = 0.45, 0.2, 0.12, 0.2
+SKIN_CLEAR, LINING_CLEAR, BONE_CLEAR, EYE_CLEAR = 0.45, 0.2, 0.22, 0.25
+#: Cosine to a wall under which it stands beside a way, not across it; mm beyond which nothing bounds a way, and by how
+#: many at once a point is brought back.
+ASIDE, FAR, DEEP = 0.3, 6.0, 2.0
 
 
 class Room:
     """The soft tissue between skin and bone.
 
     skin, bones : meshes, mm; bones may be empty. inner : (n,) bool, the skin's vertices that line mouth, nose and
-    lids (the group ``inner``). eyes : (centre (3,), radius) of each eyeball. Surfaces are found by points sampled
-    on them.
+    lids (the group ``inner``). eyes : (centre (3,), radius) of each eyeball. mirrored : quads count split along either
+    diagonal, so that a surface and its mirror image agree. Surfaces are found by points sampled on them.
     """
 
-    def __init__(self, skin: Mesh, bones: list[Mesh], inner: np.ndarray | None = None, eyes=()):
+    def __init__(self, skin: Mesh, bones: list[Mesh], inner: np.ndarray | None = None, eyes=(), mirrored: bool = True):
         inner = np.zeros(len(skin.vertices), bool) if inner is None else np.asarray(inner, bool)
-        normals = vertex_normals(skin.vertices, both_ways(skin.faces))
-        self.skins, self.linings = [], []
-        for triangles in diagonals(skin.faces):
-            lining = inner[triangles].all(axis=1)
-            self.skins.append(Samples(skin.vertices, triangles[~lining], normals))
-            if lining.any():
-                self.linings.append(Samples(skin.vertices, triangles[lining], normals, SPACING / 2))
-        self.skin = self.skins[0]
-        #: For each bone its surface with quads split along one diagonal and along the other.
-        self.bones = [[Samples(mesh.vertices, t) for t in diagonals(mesh.faces)] for mesh in bones]
+        split = both_ways if mirrored else _one_way
+        triangles = split(skin.faces)
+        normals = vertex_normals(skin.vertices, triangles)
+        self._lining = inner[triangles].all(axis=1)
+        self.skin = Samples(skin.vertices, triangles[~self._lining], normals)
+        self._whole = Samples(skin.vertices, triangles, normals, np.where(self._lining, SPACING / 2, SPACING))
+        self.bones = [Samples(mesh.vertices, split(mesh.faces)) for mesh in bones]
         self.eyes = tuple(eyes)
 
     def outward(self, points) -> np.ndarray:
         """(n, 3) unit direction to the skin's outside, smoothed over some mm."""
         return self.skin.smooth_normal(points)
 
-    def fitted(self, points, rounds: int = 12) -> np.ndarray:
-        """``points`` (n, 3) mm brought into the soft tissue by the shortest way; the skin has the last word."""
-        points = np.array(points, dtype=float)
-        todo = np.arange(len(points))
-        for _ in range(rounds):
-            moved = self._fitted_once(points[todo])
-            far = np.abs(moved - points[todo]).max(axis=1) > 1e-3
-            points[todo] = moved
-            todo = todo[far]
-            if not len(todo):
-                break
-        return points
+    def walls(self, points):
+        """For each wall near ``points`` (n, 3): mm (n,) they are clear of it (negative: within it), and the way off it.
 
-    def _fitted_once(self, points):
-        for solid in (each for bone in self.bones for each in bone):
-            height, normal, _ = solid.height(points, 10.0)
-            push = np.minimum(np.maximum(BONE_CLEAR - height, 0), 3.0)
-            points = points + push[:, None] * normal
+        The way is (n, 3) unit; where a wall is far the distance is infinite.
+        """
+        for bone in self.bones:
+            height, away, _ = bone.height(points, 8.0)
+            yield height - BONE_CLEAR, away
         for centre, radius in self.eyes:
             away = points - centre
-            far = np.linalg.norm(away, axis=1, keepdims=True)
-            points = np.where(far < radius + EYE_CLEAR, centre + away / far * (radius + EYE_CLEAR), points)
-        for surface in self.linings:
-            points = _under(points, surface, LINING_CLEAR, 6.0)
-        for surface in self.skins:
-            points = _under(points, surface, SKIN_CLEAR, 5.0)  # farther in, the rim of the lids would mislead
+            far = np.linalg.norm(away, axis=1)
+            clear = far - radius - EYE_CLEAR
+            yield np.where(clear < 8.0, clear, np.inf), away / np.maximum(far, 1e-9)[:, None]
+        height, away, triangle = self._whole.height(points, 8.0)
+        clear = np.where(self._lining[triangle], LINING_CLEAR, SKIN_CLEAR)
+        yield np.where(np.isfinite(height), -height - clear, np.inf), -away
+
+    def near_lining(self, points, reach: float) -> np.ndarray:
+        """(n,) bool: the skin within ``reach`` mm of ``points`` (n, 3) lines mouth, nose or lids."""
+        height, _, triangle = self._whole.height(points, reach)
+        return np.isfinite(height) & self._lining[triangle]
+
+    def span(self, points, ways):
+        """From where to where ``points`` (n, 3) may move along the unit ``ways`` (n, 3): (n,) and (n,) mm.
+
+        From at most 0 to at least 0 where a point is clear of every wall; walls beside the way do not count.
+        """
+        least, most = np.full(len(points), -FAR), np.full(len(points), FAR)
+        for clear, away in self.walls(points):
+            slope = np.einsum("nj,nj->n", away, ways)
+            off = np.clip(clear, -DEEP, FAR) / np.maximum(np.abs(slope), 0.5)
+            most = np.where(slope < -ASIDE, np.minimum(most, off), most)
+            least = np.where(slope > ASIDE, np.maximum(least, -off), least)
+        return least, most
+
+    def fitted(self, points, rounds: int = 12) -> np.ndarray:
+        """Single ``points`` (n, 3) mm brought into the soft tissue by the shortest way; the skin has the last word."""
+        points = np.array(points, dtype=float)
+        for _ in range(rounds):
+            before = points.copy()
+            for k in range(len(self.bones) + len(self.eyes) + 1):
+                clear, away = next(islice(self.walls(points), k, None))
+                points = points + np.clip(-clear, 0, 3.0)[:, None] * away
+            if np.abs(points - before).max(initial=0) < 1e-3:
+                break
         return points
 
 
@@ -77,15 +98,13 @@ def diagonals(faces):
         yield np.concatenate([triangles[whole], faces[faces[:, 3] < 0][:, :3]]) if corners[0][0] else triangles[whole]
 
 
+def _one_way(faces):
+    return next(diagonals(faces))
+
+
 def both_ways(faces) -> np.ndarray:
     """(t, 3): quads split along either diagonal, so that a surface and its mirror image agree."""
     return np.concatenate(list(diagonals(faces)))
-
-
-def _under(points, surface, clear, reach):
-    height, normal, far = surface.height(points, reach)
-    deep = np.where(np.isfinite(far), np.clip(height + clear, 0, 3.0), 0)
-    return points - deep[:, None] * normal
 
 
 def _unit(vectors):
@@ -93,7 +112,7 @@ def _unit(vectors):
 
 
 class Samples:
-    """A surface (n, 3), (m, 3) as points about ``spacing`` mm apart with smooth normals.
+    """A surface (n, 3), (m, 3) as points about ``spacing`` mm apart (a number, or one for each triangle), smooth normals.
 
     ``normals`` (n, 3): those of a larger surface of which this is a piece.
     """
@@ -117,9 +136,9 @@ class Samples:
         self._tree = cKDTree(self.points)
 
     def height(self, points, reach=np.inf):
-        """(n,) mm above the surface (negative inside), the (n, 3) way out of it and the (n,) mm to the nearest sample.
+        """(n,) mm above the surface (negative inside), the (n, 3) way out of it and the (n,) triangle that is near.
 
-        Where nothing is within ``reach`` mm both lengths are infinite. Exact for the triangle of the nearest sample.
+        Where no sample is within ``reach`` mm the height is infinite. Exact for the triangles of the nearest samples.
         """
         count = min(3, len(self.points))  # in a fold the nearest sample may not be the nearest triangle's
         far, near = self._tree.query(points, k=count, distance_upper_bound=reach)
@@ -134,7 +153,7 @@ class Samples:
         away = points - np.einsum("nk,nkd->nd", weights, self._corner[triangle])
         side = np.where((away * smooth).sum(1) < 0, -1.0, 1.0)
         away = np.where(distance[:, None] > 1e-3, away * side[:, None] / np.maximum(distance, 1e-3)[:, None], smooth)
-        return np.where(found, side * distance, np.inf), away, far[:, 0]
+        return np.where(found, side * distance, np.inf), away, triangle
 
     def about(self, points):
         """(n,) mm to the nearest sample, negative inside, infinite beyond 3 mm: quick and rough."""

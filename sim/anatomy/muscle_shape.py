@@ -13,6 +13,7 @@ import numpy as np
 
 from ..mesh import Mesh
 from .head import Muscle
+from .muscle_bounds import Belly, bounded, sheet_normals
 from .muscle_room import Room
 
 #: Share of the belly's thickness at even stations from origin to insertion, where nothing else is asked for.
@@ -35,11 +36,21 @@ def muscle_shape(
     room : skin and bone that bound it; without it nothing bounds it
     profile : shares of the thickness along the fibres, at even stations (a ring has the same everywhere)
     """
+    belly = belly_on(fibres, width, thickness, ring, room, profile)
+    return belly_mesh(belly if room is None else bounded([belly], room)[0])
+
+
+def belly_on(fibres, width: float, thickness: float, ring=False, room: Room | None = None, profile=SPINDLE) -> Belly:
+    """The two sides of a muscle of `muscle_shape`'s arguments that nothing bounds; ``room`` says where the skin is."""
     sheet = muscle_sheet(fibres, ring)
     normal = frames(sheet, ring, room)[2]
     half = half_thickness(sheet, width, thickness, ring, profile)[..., None]
-    mesh = _closed_tube(sheet + half * normal, sheet - half * normal, ring)
-    return mesh if room is None else mesh.moved(room.fitted(mesh.vertices))
+    return Belly(sheet + half * normal, sheet - half * normal, normal, ring)
+
+
+def belly_mesh(belly: Belly) -> Mesh:
+    """The closed surface of a belly: stations of its columns above, then those below without the edges."""
+    return _closed_tube(_rings(belly), belly.top.shape[1], belly.ring)
 
 
 def reshaped(muscle: Muscle, fibres: np.ndarray, room: Room | None = None, centre: np.ndarray | None = None) -> Muscle:
@@ -48,24 +59,46 @@ def reshaped(muscle: Muscle, fibres: np.ndarray, room: Room | None = None, centr
     What the old surface has round each place of the old sheet, the new one has round the same place of the new sheet:
     as thick as the root of the change in length says, turned with the sheet, kept in the new ``room``.
     """
-    fibres = np.asarray(fibres, dtype=float)
-    grow = float(np.clip(_length(fibres) / max(_length(muscle.fibres), 1e-9), 0.5, 1.6)) ** 0.5
-    old, new = muscle_sheet(muscle.fibres, muscle.ring), muscle_sheet(fibres, muscle.ring)
-    at = _places(*old.shape[:2])
-    before, after = (np.stack(frames(x, muscle.ring), axis=-2).reshape(-1, 3, 3)[at] for x in (old, new))
-    offset = muscle.shape.vertices - old.reshape(-1, 3)[at]
-    local = np.einsum("nij,nj->ni", before, offset)
-    vertices = new.reshape(-1, 3)[at] + grow * np.einsum("nij,ni->nj", after, local)
+    return all_reshaped([muscle], [fibres], room, [centre])[0]
+
+
+def all_reshaped(muscles, fibres, room: Room | None = None, centres=None) -> list[Muscle]:
+    """`reshaped` for many muscles at once, which is quicker; ``centres`` may hold None where one stays."""
+    centres = [None] * len(muscles) if centres is None else centres
+    grown = [_growth(m, np.asarray(f, dtype=float)) for m, f in zip(muscles, fibres, strict=True)]
+    bellies = [_carried(m, np.asarray(f, dtype=float), g) for m, f, g in zip(muscles, fibres, grown, strict=True)]
     if room is not None:
-        vertices = room.fitted(vertices)
-    return replace(
-        muscle,
-        fibres=fibres,
-        width=muscle.width * grow,
-        thickness=muscle.thickness * grow,
-        shape=muscle.shape.moved(vertices),
-        centre=muscle.centre if centre is None else centre,
-    )
+        bellies = bounded(bellies, room)
+    return [
+        replace(
+            muscle,
+            fibres=np.asarray(lines, dtype=float),
+            width=muscle.width * grow,
+            thickness=muscle.thickness * grow,
+            shape=muscle.shape.moved(_rings(belly)),
+            centre=muscle.centre if centre is None else centre,
+        )
+        for muscle, lines, grow, belly, centre in zip(muscles, fibres, grown, bellies, centres, strict=True)
+    ]
+
+
+def _growth(muscle, fibres):
+    return float(np.clip(_length(fibres) / max(_length(muscle.fibres), 1e-9), 0.5, 1.6)) ** 0.5
+
+
+def _carried(muscle, fibres, grow) -> Belly:
+    """The belly of ``muscle`` on other fibres (f, p, 3)."""
+    old, new = muscle_sheet(muscle.fibres, muscle.ring), muscle_sheet(fibres, muscle.ring)
+    before, after = (np.stack(frames(x, muscle.ring), axis=-2) for x in (old, new))
+    columns, stations = old.shape[:2]
+    rings = muscle.shape.vertices.reshape(stations, -1, 3).transpose(1, 0, 2)
+    top = rings[:columns]
+    low = np.concatenate([rings[:1], rings[columns:][::-1], rings[columns - 1 : columns]])
+    turned = np.einsum("csji,csjk->csik", after, before)  # from the old frame to the new one
+    sides = [new + grow * np.einsum("csij,csj->csi", turned, side - old) for side in (top, low)]
+    normal = after[..., 2, :]
+    up = np.sign(((sides[0] - sides[1]) * normal).sum()) or 1.0
+    return Belly(*sides, up * normal, muscle.ring)
 
 
 def recentred(muscle: Muscle, centre: np.ndarray) -> Muscle:
@@ -106,12 +139,7 @@ def half_thickness(sheet: np.ndarray, width: float, thickness: float, ring=False
 def frames(sheet: np.ndarray, ring=False, room: Room | None = None):
     """Unit vectors (c, s, 3) along the fibres, to the side and out of the sheet (toward the skin of ``room``)."""
     along = np.roll(sheet, -1, 1) - np.roll(sheet, 1, 1) if ring else np.gradient(sheet, axis=1)
-    side = np.gradient(sheet, axis=0)
-    # Where fibres meet in one point the sheet has no breadth: the middle of the station says how it lies.
-    normal = np.cross(along, side) + 0.2 * np.cross(along, side.mean(axis=0)[None])
-    normal /= np.maximum(np.linalg.norm(normal, axis=2, keepdims=True), 1e-9)
-    for _ in range(4):
-        normal = _unit(_evened(normal, ring))
+    normal = sheet_normals(sheet, ring)
     if room is not None:
         outward = room.outward(sheet.reshape(-1, 3)).reshape(sheet.shape)
         normal = normal * (np.sign((outward * normal).sum()) or 1.0)
@@ -137,32 +165,20 @@ def _unit(vectors):
     return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-9)
 
 
-def _evened(values, ring):
-    """Values smoothed along the muscle and across it, so that its surface does not ripple."""
-    if ring:
-        values = 0.5 * values + 0.25 * (np.roll(values, 1, 1) + np.roll(values, -1, 1))
-    else:
-        ends = np.concatenate([values[:, :1], values, values[:, -1:]], axis=1)
-        values = 0.5 * values + 0.25 * (ends[:, :-2] + ends[:, 2:])
-    ends = np.concatenate([values[:1], values, values[-1:]])
-    return 0.5 * values + 0.25 * (ends[:-2] + ends[2:])
-
-
 def _length(fibres) -> float:
     return float(np.linalg.norm(np.diff(fibres, axis=1), axis=2).sum(axis=1).mean())
 
 
-def _places(columns, stations):
-    """(n,) the place in the flattened sheet that each vertex of the tube belongs to."""
-    across = np.concatenate([np.arange(columns), np.arange(columns - 2, 0, -1)])
-    return (across[None] * stations + np.arange(stations)[:, None]).ravel()
+def _rings(belly):
+    """(n, 3) mm: the vertices of `belly_mesh`."""
+    edged = belly.top.copy()
+    edged[[0, -1]] = belly.middle[[0, -1]]
+    return np.concatenate([edged, belly.low[1:-1][::-1]]).transpose(1, 0, 2).reshape(-1, 3)
 
 
-def _closed_tube(top, bottom, ring):
-    """Mesh whose cross-sections run over the ``top`` (c, s, 3) and back along the ``bottom``; the edges are shared."""
-    rings = np.concatenate([top, bottom[1:-1][::-1]]).transpose(1, 0, 2)
-    k, m = rings.shape[:2]
-    vertices = rings.reshape(-1, 3)
+def _closed_tube(vertices, k, ring):
+    """Mesh of ``k`` cross-sections (n, 3), each over the upper side and back along the lower one."""
+    m = len(vertices) // k
     j = np.arange(m)
     step = np.arange(k if ring else k - 1)
     a, b = (step * m)[:, None], ((step + 1) % k * m)[:, None]
