@@ -87,7 +87,7 @@ def lip_arcs(text: str, count: int, points, tissue: Tissue, share: float) -> np.
     lines[:, [0, -1]] = fibres[:, [0, -1]]
     lines = calmed(lines, 9)
     level, deep = tissue.level(lines)
-    placed = lines - np.clip(share * deep, 1.6, 4.5)[..., None] * level
+    placed = lines - np.clip(share * deep, 1.4, 2.5)[..., None] * level
     ends = np.array([f[-1] for f in fibres])
     fade = np.clip((np.linspace(-1, 1, ARC_POINTS) ** 2 - 0.55) / 0.45, 0, 1)[None, :, None] ** 2
     shift = np.where(np.linspace(-1, 1, ARC_POINTS)[None, :, None] > 0, (ends - placed[:, -1])[:, None],

@@ -80,7 +80,7 @@ def bounded(bellies: list[Belly], room: Room, rounds: int = 4, floor=None, cover
     # what is left in a wall stands beside it or has no room at all: it gives way with its neighbours
     both = [side for pair in zip(*sides, strict=True) for side in pair]
     rings = [b.ring for b in bellies for _ in (0, 1)]
-    both = eased(both, None, None, rings, room, rounds=4, last=1)
+    both = eased(both, None, None, rings, room, rounds=6, wide=2)
     return [Belly(t, w, b.normal, b.ring, b.free) for t, w, b in zip(both[::2], both[1::2], bellies, strict=True)]
 
 
@@ -148,12 +148,11 @@ def sheet_normals(sheet, ring):
     return normal / np.maximum(np.linalg.norm(normal, axis=2, keepdims=True), 1e-9)
 
 
-def eased(fibres: list[np.ndarray], keep, clear, rings, room: Room, rounds: int = 12, beside=1.0, last: int = 0):
+def eased(fibres: list[np.ndarray], keep, clear, rings, room: Room, rounds: int = 12, beside=1.0, wide: int = 1):
     """Fibres, each (f, p, 3) mm, bent out of the walls of ``room`` by smooth displacements.
 
     keep : each (f, p) 0..1, how free a point is (None: wholly); clear : each (f, p) mm to keep from every wall (None:
-    0); beside : share of a displacement that may slide the fibres along their own sheet; last : final rounds in which
-    points give way alone
+    0); beside : share of a displacement that may slide the fibres along their own sheet; wide : neighbours that go along
     """
     shapes = [f.shape for f in fibres]
     cuts = np.cumsum([a * b for a, b, _ in shapes])[:-1]
@@ -163,7 +162,7 @@ def eased(fibres: list[np.ndarray], keep, clear, rings, room: Room, rounds: int 
         for each, default in ((keep, 1.0), (clear, 0.0))
     )
     normal = np.concatenate([sheet_normals(f, ring).reshape(-1, 3) for f, ring in zip(fibres, rings, strict=True)])
-    for k in range(rounds):
+    for _ in range(rounds):
         push = np.zeros_like(at)
         for distance, away in room.walls(at):
             push += np.clip(wanted - distance, 0, 2.0)[:, None] * away
@@ -171,10 +170,7 @@ def eased(fibres: list[np.ndarray], keep, clear, rings, room: Room, rounds: int 
             break
         across = np.einsum("nj,nj->n", push, normal)[:, None] * normal
         push = across + beside * (push - across)
-        if k >= rounds - last:
-            at = at + free[:, None] * push
-            continue
         parts = [x.reshape(shape) for x, shape in zip(np.split(push, cuts), shapes, strict=True)]
-        parts = [smoothed(x, ring, 1) for x, ring in zip(parts, rings, strict=True)]
+        parts = [smoothed(x, ring, wide) for x, ring in zip(parts, rings, strict=True)]
         at = at + 1.3 * free[:, None] * np.concatenate([x.reshape(-1, 3) for x in parts])
     return [x.reshape(shape) for x, shape in zip(np.split(at, cuts), shapes, strict=True)]
