@@ -124,7 +124,7 @@ class _Maker:
         beside = 1.0 if row["depth"] == "deep" else 0.25
         for _ in range(2):
             bent = eased([fibres], [keep], [clear], [ring], self.room, rounds=4, beside=beside)[0]
-            bent = bent if ring else calmed(bent, (bent.shape[1] + 3) // 2)
+            bent = bent if ring else calmed(bent, (bent.shape[1] + 3) // 2, 5 if row["path"].startswith("arc") else 3)
             fibres = held(bent, fibres, keep)
         return fibres
 

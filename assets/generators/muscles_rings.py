@@ -85,14 +85,14 @@ def lip_arcs(text: str, count: int, points, tissue: Tissue, share: float) -> np.
     fibres = np.array(fibres)
     lines = tissue.front(fibres.reshape(-1, 3)).reshape(fibres.shape)
     lines[:, [0, -1]] = fibres[:, [0, -1]]
-    lines = calmed(lines, 9)
+    lines = calmed(lines, 9, 5)
     level, deep = tissue.level(lines)
     placed = lines - np.clip(share * deep, 1.4, 2.5)[..., None] * level
     ends = np.array([f[-1] for f in fibres])
     fade = np.clip((np.linspace(-1, 1, ARC_POINTS) ** 2 - 0.55) / 0.45, 0, 1)[None, :, None] ** 2
     shift = np.where(np.linspace(-1, 1, ARC_POINTS)[None, :, None] > 0, (ends - placed[:, -1])[:, None],
                      (ends * [-1, 1, 1] - placed[:, 0])[:, None])  # fmt: skip
-    placed = calmed(placed + fade * shift, 9)
+    placed = calmed(placed + fade * shift, 9, 5)
     placed[:, 0], placed[:, -1] = ends * [-1, 1, 1], ends
     return (placed + placed[:, ::-1] * [-1, 1, 1]) / 2
 

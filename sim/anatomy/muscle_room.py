@@ -14,8 +14,8 @@ SPACING = 1.6
 #: mm of skin kept over a muscle; how near it may come to the lining of mouth and lids, and to bone.
 SKIN_CLEAR, LINING_CLEAR, BONE_CLEAR, EYE_CLEAR = 0.45, 0.2, 0.22, 0.25
 #: Cosine to a wall under which it stands beside a way, not across it; mm beyond which nothing bounds a way, and by how
-#: many at once a point is brought back.
-ASIDE, FAR, DEEP = 0.3, 6.0, 2.0
+#: many at once a point is brought back; mm within bone that are believed.
+ASIDE, FAR, DEEP, BURIED = 0.3, 6.0, 2.0, 3.0
 
 
 class Room:
@@ -47,14 +47,15 @@ class Room:
         The way is (n, 3) unit; where a wall is far the distance is infinite.
         """
         for bone in self.bones:
-            height, away, _ = bone.height(points, 8.0)
-            yield height - BONE_CLEAR, away
+            height, away, _ = bone.height(points, 8.0, -0.5)
+            # far from a sharp edge its normal cannot tell inside from outside, and no muscle lies deep in bone
+            yield np.where(height > -BURIED, height - BONE_CLEAR, np.inf), away
         for centre, radius in self.eyes:
             away = points - centre
             far = np.linalg.norm(away, axis=1)
             clear = far - radius - EYE_CLEAR
             yield np.where(clear < 8.0, clear, np.inf), away / np.maximum(far, 1e-9)[:, None]
-        height, away, triangle = self._whole.height(points, 8.0)
+        height, away, triangle = self._whole.height(points, 8.0, 0.5)
         clear = np.where(self._lining[triangle], LINING_CLEAR, SKIN_CLEAR)
         yield np.where(np.isfinite(height), -height - clear, np.inf), -away
 
@@ -135,10 +136,12 @@ class Samples:
         self.normals = _unit(bent.mean(axis=1))[self._owner]
         self._tree = cKDTree(self.points)
 
-    def height(self, points, reach=np.inf):
+    def height(self, points, reach=np.inf, doubt=0.0):
         """(n,) mm above the surface (negative inside), the (n, 3) way out of it and the (n,) triangle that is near.
 
         Where no sample is within ``reach`` mm the height is infinite. Exact for the triangles of the nearest samples.
+        doubt : cosine between the normal and the way to a point that makes it lie inside; round sharp edges normals
+        mislead, so -0.5 takes only what is plainly inside for inside, 0.5 all that is not plainly outside
         """
         count = min(3, len(self.points))  # in a fold the nearest sample may not be the nearest triangle's
         far, near = self._tree.query(points, k=count, distance_upper_bound=reach)
@@ -151,7 +154,7 @@ class Samples:
         weights, distance, triangle = weights[best], distance[best], triangle.ravel()[best]
         smooth = _unit(np.einsum("nk,nkd->nd", weights, self._bent[triangle]))
         away = points - np.einsum("nk,nkd->nd", weights, self._corner[triangle])
-        side = np.where((away * smooth).sum(1) < 0, -1.0, 1.0)
+        side = np.where((away * smooth).sum(1) < doubt * distance, -1.0, 1.0)
         away = np.where(distance[:, None] > 1e-3, away * side[:, None] / np.maximum(distance, 1e-3)[:, None], smooth)
         return np.where(found, side * distance, np.inf), away, triangle
 
