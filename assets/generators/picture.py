@@ -59,7 +59,7 @@ def draw(layers: list[Layer], view: Viewpoint) -> np.ndarray:
             front = near[where] < depth[where]
             where[where] = front
             behind = image[where] ** 2.2
-            cover = each.cover + (1 - each.cover) * (1 - facing[front, None]) ** 3  # glass hides more at a slant
+            cover = each.cover + 0.4 * (1 - facing[front, None]) ** 4  # glass hides more at a slant
             image[where] = _srgb(behind + cover * (diffuse[front] - behind) + shine[front])
     return image.reshape(view.height, 2, view.width, 2, 3).mean(axis=(1, 3))
 
@@ -94,7 +94,7 @@ def _lit(layers: list[Layer], view: Viewpoint):
     n = seen.sample(normals, triangles, where) @ view.axes.T
     n /= np.maximum(np.linalg.norm(n, axis=1, keepdims=True), 1e-9)
     away = n[:, 2] > 0.5
-    n = np.where(n[:, 2:] > 0, -n, n)
+    n = np.where(away[:, None], -n, n)
     narrow = seen.sample(polish, triangles, where)[:, None]
     shade = np.full((len(n), 3), 0.24)
     shine = np.zeros((len(n), 3))
@@ -107,7 +107,7 @@ def _lit(layers: list[Layer], view: Viewpoint):
     shade *= _open_sky(seen.depth)[where][:, None]
     lit = seen.sample(colours, triangles, where) ** 2.2 * shade * 1.25
     lit[away] *= [0.9, 0.45, 0.45]  # the inside of a surface shows red
-    return seen.depth, where, lit, seen.sample(gloss, triangles, where)[:, None] * shine, -n[:, 2]
+    return seen.depth, where, lit, seen.sample(gloss, triangles, where)[:, None] * shine, np.clip(-n[:, 2], 0, 1)
 
 
 def _open_sky(depth: np.ndarray) -> np.ndarray:

@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     from .rest import Rest
 
 SMALLEST, LARGEST = 9.5, 13.0  # mm: from a child of one year to a large adult eye
-LIES = (0.18, 0.94)  # along an eye from its inner corner: where the inner edge of the lids lies on the ball
+LIES = (0.22, 0.94)  # along an eye from its inner corner: where the inner edge of the lids lies on the ball
+EDGES = (0.08, 0.97)  # where it does on any head
 CORNERS, FADE = (0.06, 1.12), 0.12  # along an eye from its inner corner: where lids lie on the ball; fading in and out
 BESIDE = (0.7, 0.35)  # how much of that holds for the seen lid one and two edges beside the rim
 CLOSE = 0.5  # share of the reference's room around the caruncle that is enough
@@ -155,15 +156,24 @@ def lid_contact(rest: "Rest", side: str) -> LidContact:
         stiff[grown & ~reached] = hardness
         reached = grown
     share = _along(head, head.skin.vertices, side)
-    edge = np.flatnonzero(rest.rim & (rest.lids(side) > 0.3) & (share > LIES[0]) & (share < LIES[1]))
+    edge = np.flatnonzero(rest.rim & (rest.lids(side) > 0.3) & (share > EDGES[0]) & (share < EDGES[1]))
     contact = LidContact(head.skin.faces, head.skin.triangles, len(lid), stiff, edge)
     contact.allow(head.skin.vertices, head.eyes["lr".index(side)])
     return contact
 
 
-def _along(head: Head, points, side: str):
-    """(k,) from 0 at the inner corner of the eye to 1 at the outer one."""
-    marks = head.landmark_positions()
+def settled_lids(rest: "Rest", skin, eye: Eye, side: str) -> np.ndarray:
+    """Skin (n, 3) mm whose lids touch the eyeball nowhere and lie on it between the corners of the eye."""
+    contact, head = rest.contacts[side], rest.head
+    own = rest.head.landmarks.on({"skin": skin})
+    now, before = (_along(head, x[contact.edge], side, marks) for x, marks in ((skin, own), (head.skin.vertices, None)))
+    between = [(share > LIES[0]) & (share < LIES[1]) for share in (now, before)]
+    return contact.settled(skin, eye, between[0] & ~between[1])
+
+
+def _along(head: Head, points, side: str, marks=None):
+    """(k,) from 0 at the inner corner of the eye to 1 at the outer one; ``marks``: other landmarks than the head's."""
+    marks = head.landmark_positions() if marks is None else marks
     inner, outer = marks[f"en_{side}"], marks[f"ex_{side}"]
     return (points - inner) @ (outer - inner) / ((outer - inner) @ (outer - inner))
 

@@ -47,6 +47,7 @@ class LidContact:
     """
 
     def __init__(self, faces, triangles, count: int, stiff, edge):
+        self.edge = edge
         self.rows = np.flatnonzero(np.isfinite(stiff))
         self.stiff = np.asarray(stiff, float)[self.rows]
         free = np.zeros(count, dtype=bool)
@@ -75,14 +76,19 @@ class LidContact:
         height = height_over(self.all @ points, eye) * 12.0 / eye.radius
         self.least, self.most = np.minimum(self.least, height - 1e-6), np.maximum(self.most, height + 1e-6)
 
-    def settled(self, points, eye: Eye) -> np.ndarray:
-        """Skin (n, 3) mm with the lids moved as little as they must to lie on ``eye``."""
+    def settled(self, points, eye: Eye, near=None) -> np.ndarray:
+        """Skin (n, 3) mm with the lids moved as little as they must to lie on ``eye``.
+
+        near : (k,) bool, vertices of ``edge`` that must do so whatever was allowed (None: none)
+        """
         out = np.array(points, dtype=float)
         start = out[self.rows] - eye.centre
         ray = start / np.maximum(np.linalg.norm(start, axis=1, keepdims=True), 1e-9)
         rest = np.diag(self.stiff) + SMOOTH * self.bend.T @ self.bend
         size = eye.radius / 12.0
         least, most = self.least * size, self.most * size
+        if near is not None:
+            most[: 2 * len(self.edge)][np.tile(near, 2)] = EDGE[1] * size
         move = np.zeros(len(self.rows))
         best, least_wrong = None, np.inf
         for turn in range(ROUNDS):

@@ -15,11 +15,11 @@ from .head import Eye
 #: Steps from the corner to the ball and from the lower lid to the upper.
 ALONG, ACROSS = 12, 9
 #: The flesh begins and ends at these shares of the way from the corner outward.
-START, END = 0.12, 0.86
+START, END = 0.05, 0.95
 #: The rim keeps this far from the lids and the whole this far from the ball, mm.
-FREE, CLEAR = 0.3, 0.14
+FREE, CLEAR = 0.2, 0.14
 #: Mound: place along the way, half length, height in mm. Crescent: the same, and how far it is open toward the iris, mm.
-MOUND, FOLD, BOW = (0.46, 0.26, 0.95), (0.9, 0.1, 0.25), 0.9
+MOUND, FOLD, BOW = (0.42, 0.3, 1.1), (0.9, 0.1, 0.3), 0.9
 #: Thickness of the flesh, mm.
 THICK = 0.4
 
