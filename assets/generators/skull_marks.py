@@ -4,6 +4,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 
 from .skull_depth import BoneSpace
 from .skull_field import curve
@@ -55,7 +56,7 @@ def skull_marks(space: BoneSpace) -> SkullMarks:
     away /= np.linalg.norm(away, axis=1, keepdims=True)
     least = space.before(rim[:, [0, 2]] + 2.0 * away, 0.9)
     lack = np.maximum(least - rim[:, 1], 0)
-    rim[:, 1] += (np.roll(lack, 1) + lack + np.roll(lack, -1)) / 3
+    rim[:, 1] += gaussian_filter1d(maximum_filter1d(lack, 7, mode="wrap"), 4, mode="wrap")
     roof = float(space.mouth_limit(np.array([[3.0, at["ans"][1] + 16]]), 1, 6.0)[0])
     line = _closed(
         [
