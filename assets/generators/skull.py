@@ -100,7 +100,7 @@ def make_skull(skin: Mesh, groups: dict[str, np.ndarray], landmarks: dict[str, n
 
     # Where the edge of the nasal aperture is thin.
     finer = ((0.0, 11.0, 3.4), (low[1], at["ans"][1] + 4.0, 3.2), (at["ans"][2] + 2.0, at["rhi"][2] + 8.0, 3.2))
-    mesh = bone_mesh(field, low, high, 4.65, upper, far, 9.5, finer)
+    mesh = bone_mesh(field, low, high, 4.75, upper, far, 9.5, finer)
     names = [name for name in SKULL if name not in ("pg", "sl", "go_l", "go_r")]
     return space.snapped(mesh, names, reach=12.0)
 
