@@ -43,9 +43,9 @@ def skull_marks(space: BoneSpace) -> SkullMarks:
         [en[0] + 0.5, n[1] + 3.8, os[2] - 5.6],
         [eye[0] - 5.5, os[1] - 0.8, os[2] - 0.4],
         [os[0] + 5.0, os[1] + 2.6, os[2] - 1.4],
-        [ex[0] - 1.5, ex[1] - 1.0, os[2] - 7.0],
-        [ex[0] + 2.8, ex[1] + 6.3, ex[2] + 2.0],
-        [ex[0] + 0.5, ex[1] + 6.8, orb[2] + 6.5],
+        [ex[0] - 0.3, ex[1] - 0.6, os[2] - 6.2],
+        [ex[0] + 4.4, ex[1] + 7.0, ex[2] + 2.0],
+        [ex[0] + 2.0, ex[1] + 7.0, orb[2] + 6.5],
         [orb[0] + 6.5, orb[1] + 1.6, orb[2] + 1.6],
         [orb[0] - 3.5, orb[1] - 1.4, orb[2] + 0.2],
         [en[0] + 1.8, n[1] + 10.2, orb[2] + 5.0],
@@ -56,7 +56,7 @@ def skull_marks(space: BoneSpace) -> SkullMarks:
     away /= np.linalg.norm(away, axis=1, keepdims=True)
     least = space.before(rim[:, [0, 2]] + 2.0 * away, 0.9)
     lack = np.maximum(least - rim[:, 1], 0)
-    rim[:, 1] += gaussian_filter1d(maximum_filter1d(lack, 7, mode="wrap"), 4, mode="wrap")
+    rim[:, 1] += gaussian_filter1d(maximum_filter1d(lack, 7, mode="wrap"), 5, mode="wrap")
     roof = float(space.mouth_limit(np.array([[3.0, at["ans"][1] + 16]]), 1, 6.0)[0])
     line = _closed(
         [
