@@ -6,6 +6,7 @@ import numpy as np
 from ...sim.adapt.closest import Surface
 from ...sim.mesh import Mesh, vertex_normals
 from .skin_bust import bust_columns
+from .skin_fit import fair
 from .skin_layout import Layout
 from .skin_shape import both_sides
 
@@ -24,7 +25,7 @@ _BUST_LONGER = (10.0, 20.0, 14.0)
 BRUSHES = (
     ("sternocleidomastoid", [(58, 14, -48), (52, 8, -80), (38, -2, -112), (25, 0, -138), (13, 2, -162)], 3.4, 8.0),
     ("its head on the collar bone", [(34, 6, -132), (30, 6, -150), (26, 4, -164)], 1.4, 6.0),
-    ("between muscle and larynx", [(17, -22, -108), (15, -10, -124), (12, -3, -142)], -3.4, 6.0),
+    ("between muscle and larynx", [(17, -22, -108), (15, -10, -124), (12, -3, -142)], -2.6, 6.5),
     ("behind the muscle, over the collar bone", [(52, 24, -118), (46, 18, -140), (44, 14, -156)], -3.2, 8.0),
     ("thyroid cartilage", [(0, -20, -115), (0, -16, -122)], 7.5, 7.5),
     ("cricoid cartilage and windpipe", [(0, -9, -134), (0, -3, -146)], 2.0, 7.0),
@@ -69,6 +70,16 @@ def _longer_bust(layout: Layout, x: np.ndarray) -> None:
         x[column] = np.stack([np.interp(at, length, path[:, k]) for k in range(3)], axis=1)
 
 
+def _even_throat(layout: Layout, x: np.ndarray, length: float = 14.0) -> np.ndarray:
+    """Where the rows under the jaw thin out toward the neck the surface is freed of their unevenness."""
+    weight = np.zeros(layout.count)
+    vertex, column, row = layout.places()
+    weight[vertex] = np.interp(row, [25, 26, 27, 29, 31], [0, 0.25, 1, 0.8, 0]) * np.interp(
+        abs(column), [11, 14], [1, 0.3]
+    )
+    return fair(layout, x, weight, length)
+
+
 def _to_line(points: np.ndarray, line: np.ndarray) -> np.ndarray:
     """(n,) mm from points (n, 3) to a polyline (k, 3)."""
     if len(line) == 1:
@@ -83,7 +94,8 @@ def finish_neck(layout: Layout, x: np.ndarray) -> None:
     """Set the neck upright and the bust longer, then stroke the brushes over them, along the skin's normals (left side)."""
     x[:] = _upright(x)
     _longer_bust(layout, x)
-    whole = both_sides(x[layout.left])
+    whole = both_sides(_even_throat(layout, both_sides(x[layout.left]))[layout.left])
+    x[:] = whole
     triangles = Mesh(whole, layout.faces).triangles
     skin, normal = Surface(whole, triangles), vertex_normals(whole, triangles)
     out = np.zeros(layout.count)

@@ -18,6 +18,9 @@ from ..tissue.parameters import DEFAULT
 #: to, less at the other. The lining there is pushed along by the teeth, the more the less it belongs to either jaw.
 _LIPS_ASIDE, _CORNER_ASIDE = 0.48, 0.3
 _PUSHED, _PUSH = 0.9, 1.2
+#: Opening the mouth lowers the hyoid, which takes the throat's skin along, and draws the corners of the mouth and the
+#: cheeks in between the jaws: by how much at most, against the condyles' slide.
+_THROAT_DOWN, _CHEEK_IN = 1.2, 0.3
 
 
 def plainly_posed(
@@ -42,6 +45,7 @@ def plainly_posed(
     pivot = (head.jaw.condyle_l + head.jaw.condyle_r) / 2
     first = jaw_transform(head.jaw, jaw_open, jaw_forward)
     skin = _turned(head.skin.vertices, share, *first, pivot)
+    skin += np.clip(jaw_open, 0, 1) ** 1.5 * head.jaw.slide_max * _given_way(head, share)
     if jaw_side:
         rest = rotation @ first[0].T  # from there to the whole
         pivot, rest_shift = first[0] @ pivot + first[1], translation - rest @ first[1]
@@ -66,6 +70,16 @@ def _turned(points, share, rotation, translation, pivot):
     share = share[:, None]
     turn = Rotation.from_rotvec(share * Rotation.from_matrix(rotation).as_rotvec())
     return turn.apply(points - pivot) + pivot + share * (translation + rotation @ pivot - pivot)
+
+
+def _given_way(head: Head, share: np.ndarray) -> np.ndarray:
+    """(n, 3) how far the skin between the jaws gives way to the wide open mouth, against the condyles' slide."""
+    between, neck = 4 * share * (1 - share), np.asarray(head.groups["neck"], float)
+    out = np.zeros((len(share), 3))
+    out[:, 2] = -_THROAT_DOWN * between * neck
+    across = head.skin.vertices[:, 0]
+    out[:, 0] = -_CHEEK_IN * between * (1 - neck) * (1 - head.groups["mouth_bag"]) * np.clip(across / 20, -1, 1)
+    return out
 
 
 def _aside(head: Head, share: np.ndarray, side: float) -> np.ndarray:
