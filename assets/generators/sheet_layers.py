@@ -120,8 +120,9 @@ def muscle_layers(head: Head, least: float = 0.0) -> list[Layer]:
         base = muscle.name.removesuffix("_l").removesuffix("_r")
         if least and level[base] >= least:
             continue
-        hue = 0.012 + 0.004 * (sum(map(ord, base)) % 5)
-        value = 0.60 + 0.035 * level[base] + 0.02 * (sum(map(ord, base)) % 3)
+        kin = sum(map(ord, base.split("_")[0]))  # parts of one muscle look alike
+        hue = 0.012 + 0.004 * (kin % 5)
+        value = 0.60 + 0.035 * level[base] + 0.02 * (kin % 3)
         belly = np.array(colorsys.hsv_to_rgb(hue, 0.66 - 0.02 * level[base], value))
         around = 4 * len(muscle.fibres) - 4
         vertices = muscle.shape.vertices
