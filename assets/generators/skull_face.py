@@ -2,7 +2,7 @@
 """The facial skull: maxilla with its alveolar process and palate, cheekbone and zygomatic arch."""
 
 import numpy as np
-from scipy.ndimage import gaussian_filter
+from scipy.ndimage import gaussian_filter, maximum_filter
 
 from .skull_arch import DentalArch
 from .skull_depth import BoneSpace
@@ -10,7 +10,7 @@ from .skull_field import carve, curve, ellipsoid, join, meet, plate, tube
 from .skull_marks import SkullMarks
 
 #: Half the thickness of the hard palate, mm.
-PALATE = 2.5
+PALATE = 2.9
 
 
 class Maxilla:
@@ -36,8 +36,8 @@ class Maxilla:
         # The hard palate lies on the roof of the mouth.
         across, back = np.meshgrid(np.linspace(0, 18, 10), np.linspace(ans[1] + 6, ans[1] + 45, 16), indexing="ij")
         high = space.mouth_limit(np.stack([across, back], axis=-1).reshape(-1, 2), 1, 2.5).reshape(across.shape)
-        high = gaussian_filter(high, 1.0, mode="nearest") + PALATE + 1.2
-        spots = np.stack([across, back, np.clip(high, ans[2] - 6.0, marks.floor - PALATE)], axis=-1).reshape(-1, 3)
+        high = gaussian_filter(maximum_filter(high, 3), 1.0, mode="nearest") + PALATE + 1.2
+        spots = np.stack([across, back, np.maximum(high, ans[2] - 6.0)], axis=-1).reshape(-1, 3)
         self.roof = plate(np.concatenate([spots, spots * [-1, 1, 1]]), np.full(2 * len(spots), PALATE))
 
     def body(self, p):

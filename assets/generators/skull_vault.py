@@ -110,9 +110,9 @@ def base_middle(p, space: BoneSpace, marks: SkullMarks):
     body = ellipsoid(p, [0, y - 30, b + 14], (21, 24, 19))
     basilar = tube(p, [[0, y - 26, b + 6], [0, y - 2, b - 1]], [12, 9.5], ((0, 0, 1), 1.5))
     bone = join(body, basilar, 8)
-    lateral = _blade(p, [18.5, y - 30.5, b + 4], [21.0, y - 26.0, b - 12], 6.5, 3.0)
-    medial = _blade(p, [13.5, y - 30.5, b + 4], [12.5, y - 28.0, b - 14], 4.6, 2.9)
-    root = tube(p, [[16, y - 34, b + 8], [16, y - 35, b - 12]], [6.0, 4.0])
+    lateral = _blade(p, [18.5, y - 30.5, b + 4], [21.0, y - 27.0, b - 8], 6.5, 3.0)
+    medial = _blade(p, [13.5, y - 30.5, b + 4], [12.5, y - 28.5, b - 9], 4.6, 2.9)
+    root = tube(p, [[16, y - 34, b + 8], [16, y - 35, b - 10]], [6.0, 4.0])
     bone = join(bone, join(join(lateral, medial, 3), root, 4), 4)
     return join(bone, ellipsoid(p, [14.0, y + 5, b - 3.5], (5.5, 10.5, 5.5), None), 4)
 
