@@ -17,14 +17,11 @@ NOT_YET = {
     "parts' cuts",
     "smooth skin's cuts",
     "teeth, tongue outside bag",
-    "bone outside",
-    "bone to lining",
     "muscles out of room",
     "muscle out of skin",
     "muscle in bone",
     "smooth skin self-cuts",
     "skin self-cuts",
-    "bone cover",
 }
 
 
