@@ -16,9 +16,9 @@ from .teeth_places import neck_line, tooth_rows
 #: Where the limit surface lies, (x, behind, above) mm against the middle of the line where the lips meet; from the
 #: middle sideways, eight over the mouth, then the corner's meridian, then eight under it.
 _UPPER = {
-    8: [(0, 6.0, 14.5), (5, 6.3, 14.5), (10, 7.5, 14.7), (15.8, 10.5, 14.9), (22, 15.5, 14.9), (27.8, 22.8, 14.2),
+    8: [(0, 6.0, 13.4), (5, 6.3, 13.5), (10, 7.5, 13.9), (15.8, 10.5, 14.4), (22, 15.5, 14.6), (27.8, 22.8, 14.2),
         (31.3, 32, 12), (33.4, 40.5, 6.5)],
-    11: [(0, 31, 18.5), (4.5, 32, 18.5), (8.0, 35, 18.5), (11, 39, 18.5), (13.4, 44, 18.5), (15.2, 50.5, 18), (17, 57.5, 16),
+    11: [(0, 30, 17.6), (4.5, 31, 17.6), (8.0, 34, 17.6), (11, 38, 17.7), (13.4, 43, 17.8), (15.2, 49.5, 17.8), (17, 57, 16),
          (19.5, 66, 10)],
 }  # fmt: skip
 _CORNER = {8: (33.8, 42.5, -0.5), 9: (32.5, 64.5, 3), 10: (28.5, 70, 3), 11: (24, 71.5, 2)}
@@ -45,6 +45,9 @@ _INNER = 0.5
 #: How much the cage keeps to the places wanted of the limit surface, by steps from the middle to the corner: free of
 #: this it would swing and cut itself.
 _STIFF = np.array([0.3, 0.3, 0.3, 0.3, 0.3, 0.3, 0.6, 2.0, 2.0])
+
+#: The same on palate and floor: bone, which keeps clear of the cage too, is to be near them.
+_BROAD = 2.0
 
 #: mm behind the line: the middle of the back wall.
 _BACK = 72.5
@@ -74,7 +77,8 @@ def mouth_bag(layout: Layout, x: np.ndarray) -> None:
     x[rows] = target
     smooth = limit(layout.faces, layout.count)[rows]
     inner = smooth[:, rows].toarray()
-    stiff = np.append(np.tile(_STIFF[8 - lip_places()[1]], 4), np.full(13, _STIFF[0]))
+    ridge = _STIFF[8 - lip_places()[1]]
+    stiff = np.concatenate([ridge, ridge, ridge, np.full(32, _BROAD), np.full(13, _STIFF[0])])
     x[rows] += np.linalg.solve(inner.T @ inner + np.diag(stiff), inner.T @ (target - smooth @ x))
 
 
