@@ -36,7 +36,7 @@ _ALONG, _PAST = (0.0, 0.095, 0.19, 0.295, 0.42, 0.575, 0.78), (4.0, 3.7)
 #: mm by which the lining stands off the teeth's necks: outward and inward; and toward the roots, above and below.
 _STAND, _APICAL = (
     0.9,
-    (np.array([1.9, 1.7, 1.7, 1.5, 1.3, 1.3, 1.3, 4.0]), np.array([1.3, 1.3, 2.2, 1.8, 1.3, 1.3, 1.3, 1.0])),
+    (np.array([1.9, 1.7, 1.7, 1.5, 1.2, 1.0, 0.8, 2.8]), np.array([1.3, 1.3, 2.2, 1.8, 1.3, 1.3, 1.3, 1.0])),
 )
 
 #: The same more on the inner side.
@@ -44,7 +44,7 @@ _INNER = 0.5
 
 #: How much the cage keeps to the places wanted of the limit surface, by steps from the middle to the corner: free of
 #: this it would swing and cut itself.
-_STIFF = np.array([0.3, 0.3, 0.3, 0.3, 0.3, 0.3, 0.6, 2.0, 2.0])
+_STIFF = np.array([0.3, 0.3, 0.3, 0.3, 0.3, 0.3, 0.5, 2.0, 2.0])
 
 #: The same on palate and floor: bone, which keeps clear of the cage too, is to be near them.
 _BROAD = 2.0

@@ -9,10 +9,11 @@ from scipy.spatial import cKDTree
 
 from ...sim.anatomy.tissue_depth import skin_counterparts, table
 from ...sim.mesh import Mesh, edges, vertex_normals
+from .mouth_lining import MouthLining
 from .skull_nets import mirror_index, symmetric
 
-#: Bone stays this far from the lining of mouth, nose and lids, mm.
-CLEARANCE = 0.6
+#: Bone stays this far from the lining of nose and lids, and from that of the mouth, mm.
+CLEARANCE, MOUTH = 0.6, 1.4
 
 #: mm from a sample of the skin to the farthest place that it speaks for.
 BETWEEN = 1.4
@@ -50,13 +51,15 @@ class BoneSpace:
         outer = triangles[~inner[triangles].any(axis=1)]
         self.points, self.directions = sampled(vertices, outer, 2.5)
         self._tree = cKDTree(self.points)
-        self._all, self._all_directions = sampled(vertices, triangles, 2.5)
+        bag = _weights(groups, "mouth_bag", skin) > 0.4  # `mouth` knows it better
+        self._all, self._all_directions = sampled(vertices, triangles[~bag[triangles].all(axis=1)], 2.5)
         self._all_tree = cKDTree(self._all)
         lined = triangles[inner[triangles].all(axis=1)]
         self._lining = sampled(vertices, lined, 2.5)[0] if len(lined) else np.zeros((0, 3))
         self._all_lined = np.zeros(len(self._all), dtype=bool)
         if len(lined):
             self._all_lined[:] = cKDTree(self._lining).query(self._all)[0] < 1e-6
+        self.mouth = MouthLining(skin, groups)
         self._place_targets()
         known = {**skin_counterparts(self.landmarks), **self._extra_counterparts()}
         spots = [(known[n], table()[_base(n)].mean - _LESS.get(n, 0)) for n in known if not n.startswith(("po", "ans"))]
@@ -112,9 +115,9 @@ class BoneSpace:
         distance, near = _signed(points, self._tree, self.points, self.directions)
         distance = np.abs(distance)
         # Only the whole skin, linings included, tells inside from outside.
-        clear = self.clearance(points)
-        below = np.where(clear > 0, distance, -distance)
-        return np.maximum(self.depth[near] - below, CLEARANCE - clear)
+        clear, mouth = self._beside_mouth(points), self.mouth.depth(points, 3.0)
+        below = np.where(np.minimum(clear, mouth) > 0, distance, -distance)
+        return np.maximum(np.maximum(self.depth[near] - below, CLEARANCE - clear), MOUTH - mouth)
 
     def beside(self, yz, deeper=0.0):
         """(k, 3) the left side of the bone as the skin's depth allows it, ``deeper`` mm more, at places (k, 2) y and z."""
@@ -159,16 +162,19 @@ class BoneSpace:
 
     def clearance(self, points):
         """(n,) mm to the nearest skin or lining, negative where there is air."""
+        return np.minimum(self._beside_mouth(points), self.mouth.depth(points))
+
+    def _beside_mouth(self, points):
         clear, near = _signed(points, self._all_tree, self._all, self._all_directions)
         # No cavity is so wide: what lies that far from its lining lies in the flesh behind it.
         return np.where(self._all_lined[near] & (clear < -WIDE), -clear, clear)
 
     def kept_inside(self, mesh: Mesh, clear=1.2) -> Mesh:
-        """``mesh`` with vertices that come too near to any skin moved inward."""
+        """``mesh`` with vertices that come too near to any skin moved inward; those round the mouth are left alone."""
         vertices, mirror = mesh.vertices.copy(), mirror_index(mesh.vertices)
         for _ in range(10):
             room, near = _signed(vertices, self._all_tree, self._all, self._all_directions)
-            move = np.where(room > -8, np.maximum(clear - room, 0), 0)
+            move = np.where((room > -8) & (self.mouth.depth(vertices, 6.0) > 5.9), np.maximum(clear - room, 0), 0)
             vertices -= move[:, None] * self._all_directions[near]
             vertices = symmetric(vertices, mirror)
         return mesh.moved(vertices)

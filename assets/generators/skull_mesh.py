@@ -37,9 +37,6 @@ def bone_mesh(field, low, high, cell: float, arch: DentalArch, far=None, coarse:
 
 def _ridge(p, arch: DentalArch, cell):
     """(n,) bool, whether the socket strip takes the place of the bone's surface there."""
-    distance, tall, near = arch.local(p)
-    return (
-        (tall < heights(arch)[-1] + 0.4 * cell)
-        & (tall > -5.0)
-        & (distance < arch.half[near] + 2.4 + np.where(arch.off(p[:, :2]) > 0, 3.0, 1.0))
-    )
+    away, tall, near = arch.local(p)
+    wide = arch.half[near] + 2.4 + np.where(away > 0, 3.0, 1.0)
+    return (tall < heights(arch)[-1] + 0.4 * cell) & (tall > -5.0) & (np.abs(away) < wide)

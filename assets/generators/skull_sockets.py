@@ -8,16 +8,16 @@ each root (juga alveolaria), most over the canine's.
 import numpy as np
 
 from ...sim.mesh import Mesh
-from .skull_arch import DentalArch, plate_thickness
-from .skull_nets import towards_surface
+from .skull_arch import DentalArch
+from .teeth_shape import built_root
 
 #: mm between a root and its socket; the rows of the walls, mm from the crest.
 PLAY = 0.4
 ROWS = (0.0, 1.6, 4.2, 7.2)
 #: Depth of a socket, mm, and what bone there must remain round its end.
-DEEP, REMAIN = 9.0, 0.8
-#: A root reaches this far from the neck, mm.
-ROOT = 13.0
+DEEP, REMAIN = 10.0, 0.8
+#: mm of bone between a socket and the wall of the ridge.
+PLATE = 0.35
 #: Swelling over the roots, mm: incisors, canine, premolars, molars.
 JUGA = np.array([0.25, 0.25, 0.9, 0.35, 0.3, 0.3, 0.2, 0.1])
 
@@ -40,18 +40,16 @@ def socket_strip(arch: DentalArch, field) -> Mesh:
     jugum = np.zeros(count)
     jugum[1::2] = JUGA
     jugum[2:-1:2] = -0.35 * (JUGA[:-1] + JUGA[1:])
-    dip = np.where(np.arange(count) % 2, 0.0, -0.5)  # the septa stand higher
+    dip = np.where(np.arange(count) % 2, 0.0, -0.3)  # the septa stand higher
     outer, inner = [], []
     for up in heights(arch):
         swell = jugum * np.clip(up / 2.0, 0, 1)
-        for _ in range(4 if up else 1):
-            wall = arch.wall(stations, +1, up + dip * (up == 0), swell)
-            swell = swell - np.maximum(arch.too_near(wall), 0) * (up > 0)
-            swell = np.maximum(swell, 0.6 - plate_thickness(up) - 0.35 * up)  # the root itself is thinner there
+        free = arch.stand(stations, +1, up + 1.0)  # where there is no room the wall cannot swell
+        swell = np.minimum(swell, np.maximum(free - arch.stand(stations, +1, up), 0.0))
         outer.append(arch.wall(stations, +1, up + dip * (up == 0), swell))
         inner.append(arch.wall(stations, -1, up + dip * (up == 0), 0.0))
     outer, inner = np.array(outer), np.array(inner)
-    crest = arch.wall(gaps, 0, -0.8, 0.0)
+    crest = arch.wall(gaps, 0, -0.5, 0.0)
     end = np.array([arch.wall(stations[-1:] + 1.4 + 0.25 * up, 0, up, 0.0)[0] for up in heights(arch)])
     rows = len(ROWS)
     # Numbers: outer rows, inner rows, septa, end.
@@ -106,14 +104,17 @@ def _sockets(arch: DentalArch, field):
     free = field(ends.reshape(-1, 3)).reshape(ends.shape[:3]).max(axis=2) < -REMAIN
     last = np.where(free.all(axis=1), len(depths), free.argmin(axis=1)) - 1
     crest = np.linalg.norm(centre - [p.neck for p in places], axis=1)
-    deep = np.clip(depths[np.maximum(last, 0)], 2.0, np.maximum(ROOT - crest, 4.0))
+    deep = np.clip(
+        depths[np.maximum(last, 0)], 2.0, np.maximum([built_root(p.tooth) + PLAY for p in places] - crest, 4.0)
+    )
     levels = ((0.0, 1.0), (0.35, 0.92), (0.85, 0.66))
     rings = np.stack([centre[:, None] + (axis * (d * deep)[:, None])[:, None] + s * round_ for d, s in levels], axis=1)
-    # Where bone is thin the socket draws in.
-    low = rings[:, 1:].reshape(-1, 3)
-    for _ in range(3):
-        thin = np.flatnonzero(field(low) > -REMAIN)
-        if len(thin):
-            low[thin] += towards_surface(lambda p: field(p) + REMAIN, low[thin], 1.0)
-    rings[:, 1:] = low.reshape(len(places), 2, 8, 3)
-    return rings, centre + axis * deep[:, None]
+    return _within(arch, rings.reshape(-1, 3)).reshape(rings.shape), centre + axis * deep[:, None]
+
+
+def _within(arch: DentalArch, points):
+    """``points`` (n, 3) drawn in to where `PLATE` mm of bone remain between them and the walls of the ridge."""
+    away, tall, near = arch.local(points)
+    wall = np.where(away > 0, *(arch.stand(arch.length[near], side, tall) for side in (1, -1)))
+    beyond = np.maximum(np.abs(away) - (wall - PLATE), 0) * np.sign(away)
+    return points - np.column_stack([arch.out[near] * beyond[:, None], np.zeros(len(points))])

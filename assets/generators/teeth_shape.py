@@ -17,8 +17,8 @@ from .teeth_sizes import Tooth
 
 #: Vertices round a tooth.
 AROUND = {"incisor": 14, "canine": 16, "premolar": 16, "molar": 16}
-#: Length of the roots as built, mm: what goes into the sockets.
-ROOT = 9.5
+#: Roots are built no longer than this, mm: long ones would reach into the nose.
+ROOT = 12.5
 
 
 class Ring(NamedTuple):
@@ -94,10 +94,10 @@ _MASTERS = {
 
 #: Rows of vertices: parameters as shares of the control rows from the root's tip to the biting face.
 _ROWS = {
-    "incisor": (0, 0.20, 0.38, 0.48, 0.56, 0.66, 0.76, 0.86, 0.94, 1),
-    "canine": (0, 0.20, 0.38, 0.48, 0.56, 0.66, 0.76, 0.86, 0.94, 1),
-    "premolar": (0, 0.18, 0.35, 0.45, 0.54, 0.63, 0.72, 0.80, 0.90, 1),
-    "molar": (0, 0.18, 0.35, 0.45, 0.54, 0.63, 0.72, 0.80, 0.90, 1),
+    "incisor": (0, 0.05, 0.12, 0.21, 0.38, 0.48, 0.56, 0.66, 0.76, 0.86, 0.94, 1),
+    "canine": (0, 0.05, 0.12, 0.21, 0.38, 0.48, 0.56, 0.66, 0.76, 0.86, 0.94, 1),
+    "premolar": (0, 0.05, 0.11, 0.19, 0.35, 0.45, 0.54, 0.63, 0.72, 0.80, 0.90, 1),
+    "molar": (0, 0.05, 0.11, 0.19, 0.35, 0.45, 0.54, 0.63, 0.72, 0.80, 0.90, 1),
 }
 
 
@@ -143,10 +143,15 @@ def _neck(form):
     return np.ptp(rings[np.abs(rings[..., 2].mean(axis=1)).argmin(), :, :2], axis=0)
 
 
+def built_root(tooth: Tooth) -> float:
+    """mm from the neck to the tip of the root as built."""
+    return min(tooth.root, ROOT)
+
+
 def tooth_points(tooth: Tooth, rows, columns) -> np.ndarray:
     """(len(rows), len(columns), 3) mm on a tooth's surface at the master's parameters.
 
-    Axes: x distal, y labial, z from the neck (0) to the crown's edge; the root goes down to ``-ROOT``.
+    Axes: x distal, y labial, z from the neck (0) to the crown's edge; the root goes down to ``-built_root(tooth)``.
     """
     points = master(tooth.form).grid(rows, columns)
     z = points[..., 2]
@@ -155,7 +160,9 @@ def tooth_points(tooth: Tooth, rows, columns) -> np.ndarray:
     scale = []
     for axis, whole, narrow in ((0, tooth.md, tooth.md_neck), (1, tooth.ll, tooth.ll_neck)):
         scale.append(whole * (share + (1 - share) * narrow / (whole * _neck(tooth.form)[axis])))
-    return np.stack([points[..., 0] * scale[0], points[..., 1] * scale[1], z * np.where(z > 0, tooth.crown, ROOT)], -1)
+    return np.stack(
+        [points[..., 0] * scale[0], points[..., 1] * scale[1], z * np.where(z > 0, tooth.crown, built_root(tooth))], -1
+    )
 
 
 def tooth_mesh(tooth: Tooth) -> tuple[np.ndarray, np.ndarray]:

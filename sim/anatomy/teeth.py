@@ -8,7 +8,7 @@ from scipy.sparse.csgraph import connected_components
 from ..mesh import Mesh
 
 #: Rings of a tooth, and how many of them are its root.
-ROWS, ROOT_ROWS = 10, 2
+ROWS, ROOT_ROWS = 12, 4
 
 
 def crowns(mesh: Mesh) -> np.ndarray:
