@@ -126,7 +126,7 @@ def make_mandible(skin: Mesh, groups: dict[str, np.ndarray], landmarks: dict[str
     arch = DentalArch(space, tooth_places(skin, groups, landmarks)["lower"], -1)
     field = Mandible(space, arch)
     low, high = mandible_box(space)
-    mesh = bone_mesh(field, low, high, 3.8, arch)
+    mesh = bone_mesh(field, low, high, 4.0, arch)
     return space.kept_inside(space.snapped(mesh, ("pg", "sl", "go_l", "go_r"), reach=12.0))
 
 

@@ -9,6 +9,8 @@ from ...sim.mesh_subdivision import smoother
 
 #: mm between the samples of the lining.
 SPACING = 0.7
+#: One in so many of them is looked at where the lining is far.
+FEW = 24
 
 
 class MouthLining:
@@ -21,7 +23,7 @@ class MouthLining:
     def __init__(self, skin: Mesh, groups: dict[str, np.ndarray]):
         bag = np.asarray(groups.get("mouth_bag", np.zeros(len(skin.vertices))), float) > 0.4
         mine = bag[skin.faces].all(axis=1)
-        self._trees, self._normals = [], []
+        self._trees, self._normals, self._sparse = [], [], []
         if not mine.any():
             return
         operator, quads = smoother(skin.faces, len(skin.vertices), 2)
@@ -31,17 +33,22 @@ class MouthLining:
             points, normals = _samples(vertices, Mesh(vertices, faces).triangles)
             self._trees.append(cKDTree(points))
             self._normals.append(normals)
+            self._sparse.append(cKDTree(points[::FEW]))
 
     def depth(self, points: np.ndarray, reach: float = 8.0) -> np.ndarray:
         """(n,) mm of flesh between points (n, 3) and the lining, at most ``reach``, negative in the hollow of the mouth."""
         out = np.full(len(points), reach)
-        for tree, normals in zip(self._trees, self._normals, strict=True):
-            near_by = ((points > tree.mins - reach) & (points < tree.maxes + reach)).all(axis=1)
-            ask = np.flatnonzero(near_by)
+        for tree, sparse, normals in zip(self._trees, self._sparse, self._normals, strict=True):
+            ask = np.flatnonzero(((points > tree.mins - reach) & (points < tree.maxes + reach)).all(axis=1))
             distance, near = tree.query(points[ask], distance_upper_bound=reach)
-            found = np.isfinite(distance)
-            ask, near, distance = ask[found], near[found], distance[found]
+            far = np.flatnonzero(~np.isfinite(distance))
+            near[far] = 0
             air = ((points[ask] - tree.data[near]) * normals[near]).sum(axis=1) > 0
+            # What is farther may still lie in the hollow, if all of the lining around says so.
+            away, some = sparse.query(points[ask[far]], k=8)
+            distance[far] = away[:, 0]
+            gap = points[ask[far], None] - sparse.data[some]
+            air[far] = ((gap * normals[some * FEW]).sum(axis=2) > 0).all(axis=1)
             out[ask] = np.minimum(out[ask], np.where(air, -distance, distance))
         return out
 

@@ -17,6 +17,8 @@ LINING, WALL = 0.7, 1.0
 THIN = 4.0
 #: mm that walls are looked for from the middle of the ridge outward, and from its crest toward the roots.
 REACH, DEEP, STEP = 9.0, 16.0, 0.4
+#: Every so many stations and levels of the walls are looked for; between them they run straight.
+EVERY = 4
 
 
 class DentalArch:
@@ -66,11 +68,12 @@ class DentalArch:
         self._tree = cKDTree(self.middle)
         self.limit_middle = float(space.mouth_limit(np.array([[4.0, self.middle[-1, 1] - 14]]), rise, 4.0)[0])
 
-    def _rays(self, up, out):
-        """(240, u, t, 3) mm: points ``up`` (u,) from the crest toward the roots and ``out`` (t,) from the middle line."""
-        down = self.lean[:, None, None] * (self.rise * up)[:, None, None]
-        plan = self.middle[:, None, None] + down + self.out[:, None, None] * out[:, None]
-        height = self.crest[:, None, None] + (self.rise * up)[:, None] + 0 * out
+    def _rays(self, up, out, every=1):
+        """(240 / every, u, t, 3) mm: points ``up`` (u,) from the crest to the roots and ``out`` (t,) from the middle line."""
+        k = slice(None, None, every)
+        down = self.lean[k, None, None] * (self.rise * up)[:, None, None]
+        plan = self.middle[k, None, None] + down + self.out[k, None, None] * out[:, None]
+        height = self.crest[k, None, None] + (self.rise * up)[:, None] + 0 * out
         return np.concatenate([plan, height[..., None]], axis=-1)
 
     def _sunk(self):
@@ -86,12 +89,14 @@ class DentalArch:
 
     def _room(self, side):
         """(240, u) mm from the middle line to the wall on one side, at the levels kept: as thick as lining and skin allow."""
-        out = np.arange(0, REACH, STEP)
-        at = self._rays(self._levels, side * out)
+        out, levels = np.arange(0, REACH, STEP), self._levels[::2]
+        at = self._rays(levels, side * out, EVERY)
         flat, shape = at.reshape(-1, 3), at.shape[:3]
         shut = (self.space.mouth.depth(flat, 2.0) < WALL) | (self.space.depth_seen(flat) < THIN)
         shut = shut.reshape(shape)
         free = np.where(shut.any(axis=2), out[shut.argmax(axis=2)] - STEP / 2, REACH)
+        row, level = np.arange(len(self.length)) / EVERY, np.arange(len(self._levels)) / 2
+        free = map_coordinates(free, np.meshgrid(row, level, indexing="ij"), order=1, mode="nearest")
         free = _even(minimum_filter1d(free, 9, axis=0, mode="nearest"), 3.0)
         free = gaussian_filter1d(free, 1.0, axis=1, mode="nearest")
         wanted = self.half[:, None] + plate_thickness(self._levels)

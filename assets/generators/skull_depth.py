@@ -116,6 +116,7 @@ class BoneSpace:
         distance = np.abs(distance)
         # Only the whole skin, linings included, tells inside from outside.
         clear, mouth = self._beside_mouth(points), self.mouth.depth(points, 3.0)
+        mouth[mouth >= 3.0] = np.inf
         below = np.where(np.minimum(clear, mouth) > 0, distance, -distance)
         return np.maximum(np.maximum(self.depth[near] - below, CLEARANCE - clear), MOUTH - mouth)
 
