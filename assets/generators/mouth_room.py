@@ -19,7 +19,7 @@ class MouthRoom:
     Attributes
     ----------
     line : z of the line where the lips meet, mm
-    back : y of the bag's back wall, mm
+    back : y of the bag's back wall at its middle, mm
     """
 
     def __init__(self, skin: Mesh, groups: dict[str, np.ndarray], landmarks: dict[str, np.ndarray]):
@@ -35,7 +35,9 @@ class MouthRoom:
         self.vertices = smooth
         self._points, self._normals = sampled(smooth, self.triangles, 0.8)
         self._tree = cKDTree(self._points)
-        self.back = float(self._points[:, 1].max())
+        cage, self._cage_normals = sampled(skin.vertices, Mesh(skin.vertices, skin.faces[mine]).triangles, 0.8)
+        self._cage = cKDTree(cage)
+        self.back = float(self._points[np.abs(self._points[:, 0]) < 8, 1].max())
         self._maps = {rise: self._map(rise) for rise in (1, -1)}
 
     def _map(self, rise):
@@ -70,10 +72,24 @@ class MouthRoom:
         height = ((points - self._points[near]) * self._normals[near]).sum(axis=1)
         return np.where(height < 0, -distance, distance), self._normals[near]
 
-    def kept_in(self, points: np.ndarray, clear: float | np.ndarray, rounds: int = 4) -> np.ndarray:
-        """(k, 3) points, those nearer to the lining than ``clear`` mm (or in the flesh) moved off it."""
+    def kept_in(
+        self, points: np.ndarray, clear: float | np.ndarray, rounds: int = 4, dip: float = np.inf
+    ) -> np.ndarray:
+        """(k, 3) points, those nearer to the lining than ``clear`` mm (or in the flesh) moved off it.
+
+        dip : mm that they may lie behind the cage, which stands out from the lining where that is round
+        """
         points = np.array(points, float)
         for _ in range(rounds):
             room, normal = self.clearance(points)
             points += np.clip(clear - room, 0, 4.0)[:, None] * normal
+            if np.isfinite(dip):
+                behind, normal = self.behind_cage(points)
+                points += np.clip(behind - dip, 0, 4.0)[:, None] * normal
         return points
+
+    def behind_cage(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(k,) mm by which points (k, 3) lie behind the lining's cage, 0 before it, and (k, 3) the cage's normal."""
+        distance, near = self._cage.query(points)
+        normal = self._cage_normals[near]
+        return np.where(((points - self._cage.data[near]) * normal).sum(axis=1) < 0, distance, 0.0), normal

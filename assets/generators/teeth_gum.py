@@ -18,12 +18,12 @@ from .teeth_shape import tooth_points
 #: Margin of the gum: mm toward the crown from the neck at the middle of a tooth, and at the papilla's tip.
 MARGIN = 0.6
 PAPILLA = {"incisor": 4.6, "canine": 4.2, "premolar": 3.3, "molar": 2.9}
-#: mm between the gum's face and the lining, and of its back.
-CLEAR, BACK_CLEAR = 0.85, 0.3
+#: mm between the gum's face and the lining, and of its back; and that its face may lie behind the cage.
+CLEAR, BACK_CLEAR, DIP = 0.7, 0.15, 0.35
 #: Steps from the lingual side of the ridge to the middle of the palate.
 PALATE = 6
 #: From the margin away: mm toward the root, mm outward of the neck.
-_FLANK = ((0.9, 0.45), (2.6, 0.85), (5.8, 1.2))
+_FLANK = ((0.9, 0.45), (2.4, 0.9), (4.6, 1.3))
 
 
 class Section(NamedTuple):
@@ -138,8 +138,8 @@ def _over_the_ridge(s: Section):
 def _inside(sheet, room):
     """The sheet moved off the lining of the mouth, evenly along the row."""
     shape = sheet.shape
-    moved = (room.kept_in(sheet.reshape(-1, 3), CLEAR, 6) - sheet.reshape(-1, 3)).reshape(shape)
-    return room.kept_in((sheet + _evened(moved, 1.2)).reshape(-1, 3), 0.6 * CLEAR).reshape(shape)
+    moved = (room.kept_in(sheet.reshape(-1, 3), CLEAR, 6, DIP) - sheet.reshape(-1, 3)).reshape(shape)
+    return room.kept_in((sheet + _evened(moved, 1.2)).reshape(-1, 3), 0.6 * CLEAR, 4, DIP).reshape(shape)
 
 
 def _evened(rows, sigma):
@@ -206,7 +206,7 @@ def _behind(vertices, normal, deep, room):
     back = vertices.copy()
     for share in (0.2, 0.35, 0.5, 0.7, 1.0):
         lower = vertices - (share * deep)[:, None] * normal
-        free = room.clearance(lower)[0] > BACK_CLEAR
+        free = (room.clearance(lower)[0] > BACK_CLEAR) & (room.behind_cage(lower)[0] < DIP + 0.15)
         back[free] = lower[free]
     return back
 

@@ -2,9 +2,11 @@
 """The tongue at rest: tip behind the lower incisors, domed back with its median groove, root going down and back."""
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d
+from scipy.ndimage import gaussian_filter, gaussian_filter1d, minimum_filter
+from scipy.spatial import cKDTree
 
 from ...sim.mesh import Mesh
+from .mouth_lining import MouthLining
 from .mouth_room import MouthRoom
 from .skull_field import curve
 from .teeth_shape import tube_faces
@@ -18,6 +20,8 @@ UNDER = ((0.0, -4.7), (0.02, -6.2), (0.07, -7.8), (0.15, -9.4), (0.25, -12.5), (
          (0.8, -16.5), (0.9, -14.5))  # fmt: skip
 #: mm kept to teeth and gums, to the roof of the mouth, to its floor and walls.
 BESIDE, ABOVE, CLEAR = 0.9, 2.2, 0.8
+#: How far the tongue may be drawn in where it lacks room.
+SHARES = np.linspace(1.0, 0.4, 13)
 
 
 def make_tongue(
@@ -28,7 +32,7 @@ def make_tongue(
     teeth = np.concatenate([_enamel(teeth_upper), teeth_lower.vertices])
     teeth = teeth[np.abs(teeth[:, 2] - room.line) < 10]
     front = teeth[(np.abs(teeth[:, 0]) < 3) & (teeth[:, 2] < room.line - 1), 1].max() + 1.2
-    back = room.back - 6.0
+    back = room.back - 3.5
     top, under = (curve(np.array(line), ALONG) for line in (TOP, UNDER))
     turn = np.linspace(-np.pi / 2, np.pi / 2, AROUND // 2 + 1)  # left half, from under the tongue to its back
     side, up = np.cos(turn), np.sin(turn)
@@ -47,7 +51,7 @@ def make_tongue(
     wide = wide * np.interp(share, [0, 0.85, 1], [1, 1, 0.8])
     rings[..., 0] = wide * side**0.75 * np.where(up < 0, 1 - 0.35 * up**2 * np.interp(share, [0, 0.3], [0, 1]), 1.0)
     rings[..., 2] -= 1.6 * np.exp(-((rings[..., 0] / 2.6) ** 2)) * (up > 0.3) * np.sin(np.pi * share) ** 0.7
-    points = room.kept_in(rings.reshape(-1, 3), CLEAR).reshape(rings.shape)
+    points = _shrunk(rings, MouthLining(skin, groups), np.concatenate([teeth_upper.vertices, teeth_lower.vertices]))
     points[:, [0, -1], 0] = 0.0
     whole = np.concatenate([points, points[:, -2:0:-1] * [-1, 1, 1]], axis=1)
     whole = np.roll(whole, -(AROUND // 4), axis=1)  # the closing strips run from the upper side to the underside
@@ -57,6 +61,18 @@ def make_tongue(
     if np.einsum("ij,ij->", corner[:, 0], np.cross(corner[:, 1], corner[:, 2])) < 0:
         faces = np.where(faces[:, 3:] >= 0, faces[:, [0, 3, 2, 1]], faces[:, [0, 2, 1, 3]])
     return Mesh(mesh.vertices, faces, material=np.zeros(len(faces), np.int16))
+
+
+def _shrunk(rings, lining, teeth):
+    """``rings`` (along, half around, 3) drawn in toward their middles until all is clear of lining and teeth."""
+    middle = 0.5 * (rings[:, :1] + rings[:, -1:]) * [0, 1, 1]
+    tree, size = cKDTree(teeth), np.full(rings.shape[:2], SHARES[-1])
+    for share in SHARES[::-1]:
+        at = (middle + share * (rings - middle)).reshape(-1, 3)
+        free = (lining.depth(at) < -CLEAR) & (tree.query(at)[0] > BESIDE)
+        size = np.where(free.reshape(size.shape), share, size)
+    size = gaussian_filter(minimum_filter(size, (3, 3), mode="nearest"), (0.8, 0.8), mode="nearest")
+    return middle + size[..., None] * (rings - middle)
 
 
 def _enamel(mesh):
