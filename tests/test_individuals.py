@@ -6,6 +6,8 @@ import os
 import numpy as np
 import pytest
 
+from headshop.sim.acting.plain_posing import plainly_posed
+from headshop.sim.health.cuts import self_cuts, smooth_skin
 from headshop.sim.health.numbers import LIMITS, numbers
 from headshop.sim.scan.individual import individual
 
@@ -53,6 +55,11 @@ def test_individuals_differ_as_people_do(reference, people):
     for part in ("teeth_upper", "tongue", "skull"):
         moved = [np.linalg.norm(p.parts[part].vertices - reference.parts[part].vertices, axis=1).mean() for p in people]
         assert min(moved) > 0.3, part
+
+
+@pytest.mark.parametrize("opening", [0.5, 1.0])
+def test_their_mouths_open_plainly_without_a_fold(people, opening):
+    assert [self_cuts(smooth_skin(plainly_posed(person, jaw_open=opening).skin)) for person in people] == [0] * PEOPLE
 
 
 def test_the_same_seed_makes_the_same_person(reference, people):
