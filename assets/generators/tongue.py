@@ -14,8 +14,8 @@ from .teeth_shape import tube_faces
 AROUND, ALONG = 20, 20
 
 #: Middle line of the upper side and of the underside, tip to root: share of the way back, mm over the line of the lips.
-TOP = ((0.0, -3.3), (0.02, -1.7), (0.07, -0.3), (0.16, 1.4), (0.32, 4.0), (0.5, 6.6), (0.68, 7.4), (0.84, 5.4),
-       (0.95, -0.5), (1, -8.0))  # fmt: skip
+TOP = ((0.0, -3.3), (0.02, -1.7), (0.07, -0.3), (0.16, 1.4), (0.32, 4.0), (0.5, 6.6), (0.68, 7.4), (0.84, 6.0),
+       (0.95, 2.6), (1, -2.5))  # fmt: skip
 UNDER = ((0.0, -4.7), (0.02, -6.2), (0.07, -7.8), (0.15, -9.4), (0.25, -12.5), (0.38, -15.5), (0.52, -16.8), (0.68, -17),
          (0.8, -16.5), (0.9, -14.5))  # fmt: skip
 #: mm kept to teeth and gums, to the roof of the mouth, to its floor and walls.
@@ -32,7 +32,7 @@ def make_tongue(
     teeth = np.concatenate([_enamel(teeth_upper), teeth_lower.vertices])
     teeth = teeth[np.abs(teeth[:, 2] - room.line) < 10]
     front = teeth[(np.abs(teeth[:, 0]) < 3) & (teeth[:, 2] < room.line - 1), 1].max() + 1.2
-    back = room.back - 3.5
+    back = room.back - 10.0
     top, under = (curve(np.array(line), ALONG) for line in (TOP, UNDER))
     turn = np.linspace(-np.pi / 2, np.pi / 2, AROUND // 2 + 1)  # left half, from under the tongue to its back
     side, up = np.cos(turn), np.sin(turn)
