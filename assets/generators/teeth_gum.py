@@ -19,7 +19,7 @@ from .teeth_shape import tooth_points
 MARGIN = 0.6
 PAPILLA = {"incisor": 4.6, "canine": 4.2, "premolar": 3.3, "molar": 2.9}
 #: mm between the gum's face and the lining, and of its back; and that its face may lie behind the cage.
-CLEAR, BACK_CLEAR, DIP = 0.7, 0.15, 0.35
+CLEAR, BACK_CLEAR, DIP = 0.9, 0.12, 0.2
 #: Steps from the lingual side of the ridge to the middle of the palate.
 PALATE = 6
 #: From the margin away: mm toward the root, mm outward of the neck.

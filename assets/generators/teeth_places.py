@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...sim.mesh import Mesh
+from .teeth_shape import tooth_mesh
 from .teeth_sizes import LOWER, UPPER, Tooth
 
 #: The line through the contact points: half width and depth mm, and exponent (see `arch`).
@@ -168,7 +169,7 @@ def _row(teeth, shape, front, up, edges):
 
     up : where the crowns point, +1 or -1 in z; edges : heights of the biting edges toward the other row, mm
     """
-    from .teeth_contact import Touch, first_touch
+    from .teeth_contact import CONTACT, Touch, first_touch
 
     line, places, start = _Line(shape), [], 0.0
     for tooth, edge in zip(teeth, edges, strict=True):
@@ -183,8 +184,16 @@ def _row(teeth, shape, front, up, edges):
         else:
             way = start - first_touch(lambda w: before.gap(place(start - w)), -1.2, 1.0)  # noqa: B023 (used at once)
         places.append(place(way))
+        if before is None:
+            places[0] = places[0]._replace(neck=places[0].neck + [CONTACT / 2 - _innermost(places[0]), 0, 0])
         start = line.end(way, tooth.md)
     return places
+
+
+def _innermost(place):
+    """x of the crown's point nearest to the midline, mm."""
+    vertices = tooth_mesh(place.tooth)[0]
+    return float((vertices[vertices[:, 2] > 0] @ place.axes + place.neck)[:, 0].min())
 
 
 def _place(tooth, a, b, front, up, edge):
