@@ -13,5 +13,11 @@ MEET = 0.97
 def with_shut_eyes(reference: Head, sides: tuple[str, ...]) -> Head:
     """``reference`` with the lids of the ``sides`` (``l``, ``r``) turned shut over the eyeballs, by no muscle."""
     from ..acting.plain_posing import plainly_posed
+    from .rest import rest_of
 
-    return plainly_posed(reference, blink=tuple(MEET * (side in sides) for side in "lr"))
+    shut = plainly_posed(reference, blink=tuple(MEET * (side in sides) for side in "lr"))
+    skin = shut.skin.vertices
+    for eye, side in zip(shut.eyes, "lr", strict=True):
+        if side in sides:
+            skin = rest_of(reference).contacts[side].settled(skin, eye)
+    return shut.with_vertices({"skin": skin})

@@ -11,8 +11,8 @@ from .structures import Lids
 
 #: Share of the opening that the lower lid covers in a blink at the middle of the eye, at least and at most beside it.
 LOWER_SHARE, SHARES = 0.12, (0.1, 0.6)
-#: mm over the ball of the seen lid when shut, at least.
-PLATE = 1.2
+#: mm over the ball of the seen lid when shut, at least, from a quarter of its length on: its back needs room.
+PLATE = 2.3
 #: Rounds in which the reliefs of neighbouring strips are evened out.
 EVEN = 2
 
@@ -89,11 +89,11 @@ def relief(lids: Lids, shut: np.ndarray, root, length, pair, reach) -> np.ndarra
     world = lids.eye.centre + goal @ frame
     away = world - lids.eye.centre
     far = np.linalg.norm(away, axis=1)
-    least = reach(world) + np.minimum(PLATE, thick[strip])
+    least = reach(world) + thick[strip] + np.clip(4 * t[:, 0], 0, 1) * np.maximum(PLATE - thick[strip], 0)
     world = lids.eye.centre + away * (np.maximum(far, least) / far)[:, None]
     # the lower lid only closes ranks at its edge
     share = np.where(lids.upper[rows], 1.0, (t[:, 0] == 0).astype(float))
-    out[rows] = (share * np.clip(1.5 * lids.middle[rows], 0, 1))[:, None] * (world - shut[rows])
+    out[rows] = (share * np.clip(1.3 * lids.middle[rows], 0, 1))[:, None] * (world - shut[rows])
     # evenly from strip to strip
     beside = pair[seen[pair].all(axis=1) & (root[pair[:, 0]] != root[pair[:, 1]])]
     count = np.maximum(np.bincount(beside.ravel(), minlength=len(out)), 1)[:, None]

@@ -18,7 +18,7 @@ from .structures import Lids
 
 #: The middle of a lid lags behind its ends as it closes, so that its edge stays an arc: exponents over the share at the
 #: corners of the eye and at its middle.
-_LAG = (0.8, 1.35)
+_LAG = (0.75, 1.4)
 #: Closed lids are pressed on each other by this much, mm, as the edges are measured column by column: between the columns
 #: they reach farther, so it is less than nothing.
 _SEAL = -0.08
@@ -133,7 +133,7 @@ def build_lids(head: Head, layers: Layers, side: str) -> Lids | None:
         hold=weight**2 * np.where(inner, 0.5, 1.0),
         opening=opening,
         missing=missing,
-        middle=np.clip(1.15 * (1 - across**2), 0, 1),
+        middle=1 - across**4,
         lower_share=lower_share(within, corners, *curves, eye.radius),
         relief=np.zeros((len(column), 3)),
         seal=np.zeros(len(column)),
@@ -240,7 +240,7 @@ def _lagging(lids: Lids, amount: float):
     """(v,) how far each part of a lid is when its blink is at ``amount``."""
     if not 0 < amount < 1:
         return amount
-    return amount ** (_LAG[0] + (_LAG[1] - _LAG[0]) * lids.middle)
+    return amount ** (_LAG[0] + (_LAG[1] - _LAG[0]) * lids.middle**2)
 
 
 def at_rest(lids: Lids) -> np.ndarray:
