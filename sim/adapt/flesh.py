@@ -3,6 +3,7 @@
 
 import numpy as np
 from scipy.sparse import coo_matrix, diags, vstack
+from scipy.spatial import cKDTree
 
 from ..anatomy.head import Eye
 from ..mesh import Mesh, edges
@@ -14,7 +15,7 @@ from .lid_contact import height_over
 #: mm that the flesh keeps from the lids and from the ball.
 FROM_LIDS, FROM_BALL = 0.08, 0.06
 #: mm of skin around it that is looked at; rounds, of which all but the last `FIRM` also even out the moves.
-AROUND, ROUNDS, FIRM = 1.5, 18, 10
+AROUND, ROUNDS, FIRM = 2.5, 18, 10
 #: Sizes of the flesh that are tried until it cuts nothing.
 SIZES = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4)
 
@@ -25,10 +26,10 @@ def cleared(flesh: Mesh, skin: Mesh, eye: Eye, room: float = 1.0) -> np.ndarray:
     room : share of the usual distances that is kept. Where there is too little space, the flesh shrinks toward its middle.
     """
     operator, quads = smoother(skin.faces, len(skin.vertices))
-    low, high = flesh.vertices.min(axis=0) - AROUND, flesh.vertices.max(axis=0) + AROUND
+    tree = cKDTree(flesh.vertices)
     walls, near = [], []
     for mesh in (skin, Mesh(operator @ skin.vertices, quads)):
-        inside = ((mesh.vertices > low) & (mesh.vertices < high)).all(axis=1)
+        inside = tree.query(mesh.vertices, distance_upper_bound=AROUND)[0] < AROUND
         near.append((mesh.vertices, mesh.triangles[inside[mesh.triangles].any(axis=1)]))
         walls.append(Surface(*near[-1]))
     middle = flesh.vertices.mean(axis=0)
