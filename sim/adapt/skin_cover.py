@@ -101,9 +101,9 @@ class SkinCover:
 def signed_depth(points, surface: Surface, reach: float, whole: Mesh | None = None):
     """How deep ``points`` (k, 3) lie within a surface, mm, negative outside, at most ``reach``; and the `Contacts`.
 
-    Opposite the inside of the skin's triangles their normals tell the side. Opposite sides and corners most points are
-    expected within, or outside where ``surface`` is but a piece of a ``whole``, which may turn back on itself: only where
-    the smooth normal does not plainly say so, the winding number is asked.
+    Most are expected within, or outside where ``surface`` is but a piece of a ``whole``, and the normal of the triangle or
+    the smooth normal at the side or corner they are opposite to says so. Where it does not, the winding number is asked:
+    skin folds, and bone has thin walls.
     """
     found = surface.closest(points, reach)
     depth = np.where(found.found, found.distance, reach)
@@ -113,9 +113,8 @@ def signed_depth(points, surface: Surface, reach: float, whole: Mesh | None = No
     normal = np.where(facing[:, None], surface.face_normals[found.triangle[near]], found.normals[near])
     rise = np.einsum("ij,ij->i", off, normal)
     inner = np.full(len(points), whole is None)
-    inner[near[facing]] = rise[facing] < 0
-    plain = rise < -0.3 * np.minimum(found.distance[near], SURE) if whole is None else rise > 0
-    ask = near[~facing & ~plain]
+    doubt = np.where(facing, 0.0, -0.3 * np.minimum(found.distance[near], SURE))
+    ask = near[rise > doubt] if whole is None else near[rise < 0]
     solid = surface if whole is None else whole
     inner[ask] = winding_number(points[ask], solid.vertices, solid.triangles) > 0.5
     return np.where(inner, depth, -depth), found
