@@ -54,7 +54,7 @@ def weld(vertices: np.ndarray, triangles: np.ndarray, tolerance: float = 1e-5):
     return vertices[used], merged.reshape(-1, 3).astype(np.int32)
 
 
-def _cover(corners: np.ndarray, spacing: float):
+def spread(corners: np.ndarray, spacing: float):
     """Sample points over triangles (m, 3, 3) -> points (s, 3), owner (s,), covering radius in mm."""
     middle = corners.mean(axis=1)
     reach = np.sqrt(((corners - middle[:, None]) ** 2).sum(2).max(1))
@@ -98,7 +98,7 @@ class Surface:
         self.normals = self._smoothed(smooth)
         # Finer than the triangles where there are few: less to try for each query.
         spacing = max(float(np.median(np.sqrt(double))), 1e-6) * (0.55 if len(double) < 30_000 else 0.75)
-        samples, self._owner, self._radius = _cover(self.corners, spacing)
+        samples, self._owner, self._radius = spread(self.corners, spacing)
         self._tree = cKDTree(samples)
 
     def _topology(self):

@@ -8,8 +8,9 @@ from ..anatomy.inside import winding_number
 from ..mesh import Mesh, edges
 from ..mesh_subdivision import drawn
 from .bone import NEAR
-from .closest import Surface
+from .closest import Surface, spread
 
+LARGE = 9.0  # mm: triangles of linings with a longer side are looked at more closely
 STEP = 3.0  # mm: the most that is asked of bone at once
 NEXT = 1.5  # mm: places of the skin farther from bone than this besides what they need are left alone
 SURE = 3.0  # mm: nearer than this a normal that is not plain about the side is not trusted
@@ -33,12 +34,12 @@ class SkinCover:
         for vertices in (skin.vertices, drawn(skin.faces, skin.vertices)):
             self.layers.append((Surface(vertices, skin.triangles), Surface(vertices, sides[0])))
             for k, some in enumerate(sides):
-                at = np.concatenate(
-                    [
-                        x.mean(axis=1)
-                        for x in (vertices[np.unique(some)[:, None]], vertices[edges(some)], vertices[some])
-                    ]
-                )
+                corners = vertices[some]
+                at = [vertices[np.unique(some)], vertices[edges(some)].mean(axis=1), corners.mean(axis=1)]
+                large = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1) > LARGE
+                if k and large.any():  # linings stretch
+                    at.append(spread(corners[large], LARGE / 3)[0])
+                at = np.concatenate(at)
                 self.points.append(at)
                 seen.append(np.full(len(at), k == 0))
         #: (s, 3) places on either skin, and whether they are seen.
