@@ -12,10 +12,14 @@ from headshop.assets.generators.eyes import make_eyes
 from headshop.assets.generators.skin import make_skin
 from headshop.assets.generators.skin_layout import skin_layout
 from headshop.sim.acting.plain_posing import plainly_posed
+from headshop.sim.adapt.eyeballs import with_orbit
+from headshop.sim.adapt.rest import Rest
 from headshop.sim.anatomy.eyeball import BALL, eye_of_size, reach, turned_eye
 from headshop.sim.anatomy.head import MATERIALS, Eye
 from headshop.sim.anatomy.storage import anatomy_document, head_from_document, load_head
 from headshop.sim.errors import InputError
+from headshop.sim.health.cuts import smooth_skin
+from headshop.sim.mesh_piercing import piercings
 from headshop.sim.mesh_subdivision import limit
 from headshop.sim.tissue.lids import gaze_direction, gaze_rotation
 
@@ -70,9 +74,49 @@ def test_lids_lie_on_the_ball(head, layout, smooth):
     eye = eye_frames(head.skin.vertices)[0]
     for points in (head.skin.vertices, smooth @ head.skin.vertices):
         gap = clearance(points[layout.rings["eye_l"][6]], eye)
-        assert -0.02 < gap[ON_BALL].min() and gap[ON_BALL].max() < 0.5
+        assert 0.05 < gap[ON_BALL].min() and gap[ON_BALL].max() < 0.5
         every = np.unique(np.r_[layout.rings["eye_l"].ravel(), layout.patches["eye_l"].ravel()])
-        assert clearance(points[every], eye).min() > -0.02
+        assert clearance(points[every], eye).min() > 0.02
+
+
+def test_neither_cage_nor_drawn_lids_cut_the_eye(head):
+    eye = head.parts["eye_l"]
+    for skin in (head.skin, smooth_skin(head.skin)):
+        assert len(piercings(skin.vertices, skin.triangles, eye.vertices, eye.triangles)) == 0
+        pushed = eye.vertices - [0, 0.6, 0]
+        assert len(piercings(skin.vertices, skin.triangles, pushed, eye.triangles)) > 10
+
+
+def test_lids_settle_on_a_larger_eyeball(head, layout, smooth):
+    """Of an eye pushed 0.5 mm forward and 3 % larger: lids move onto it, and nothing but the lids moves."""
+    eye = head.eyes[0]
+    larger = replace(eye, centre=eye.centre - [0, 0.5, 0], radius=1.03 * eye.radius, iris_radius=1.03 * eye.iris_radius)
+    contact = Rest(head).contacts["l"]
+    assert np.array_equal(contact.settled(head.skin.vertices, eye), head.skin.vertices)
+    skin = contact.settled(head.skin.vertices, larger)
+    for points in (skin, smooth @ skin):
+        gap = clearance(points[layout.rings["eye_l"][6]], larger)[ON_BALL]
+        assert gap.min() > 0.02 and gap.max() < 0.5
+    fine = smooth_skin(head.skin.moved(skin)).vertices
+    assert clearance(fine[np.linalg.norm(fine - larger.centre, axis=1) < 14], larger).min() > 0
+    moved = np.linalg.norm(skin - head.skin.vertices, axis=1)
+    lids = np.maximum(head.groups["lid_upper_l"], head.groups["lid_lower_l"])
+    assert moved[(lids == 0) & (head.groups["inner"] < 0.5)].max() == 0 and moved.max() < 2.5
+
+
+def test_the_orbit_goes_with_the_eye(head):
+    eye, shift = head.eyes[0], np.array([0.4, 0.0, 1.5])
+    bone = head.parts["skull"].vertices
+    went = with_orbit(bone, replace(eye, centre=eye.centre + shift), shift) - bone
+    off = np.linalg.norm(bone - eye.centre, axis=1)
+    assert np.abs(went[off < 17] - shift).max() < 1e-9 and np.abs(went[off > 34]).max() == 0
+
+
+def test_half_shut_lids_are_an_arc(head, layout, smooth):
+    edge = (smooth @ plainly_posed(head, blink=0.5).skin.vertices)[layout.rings["eye_l"][6]]
+    a, middle, b = edge[[22, 20, 17]]
+    chord = a + (b - a) * (middle[0] - a[0]) / (b[0] - a[0])
+    assert middle[2] - chord[2] > 0.35
 
 
 def test_lids_frame_the_iris_as_in_life(head, layout, smooth):

@@ -3,6 +3,8 @@
 
 from functools import lru_cache
 
+import numpy as np
+
 from ..anatomy.head import Head
 
 #: Share of the lids' way at which their margins just meet.
@@ -16,8 +18,9 @@ def with_shut_eyes(reference: Head, sides: tuple[str, ...]) -> Head:
     from .rest import rest_of
 
     shut = plainly_posed(reference, blink=tuple(MEET * (side in sides) for side in "lr"))
-    skin = shut.skin.vertices
+    rest, skin = rest_of(reference), shut.skin.vertices
+    hidden = rest.inner | rest.rim
     for eye, side in zip(shut.eyes, "lr", strict=True):
         if side in sides:
-            skin = rest_of(reference).contacts[side].settled(skin, eye)
+            skin = np.where(hidden[:, None], rest.contacts[side].settled(skin, eye), skin)
     return shut.with_vertices({"skin": skin})
