@@ -47,8 +47,7 @@ def _upright(points: np.ndarray) -> np.ndarray:
     height = z - 0.286 * (y - 6)  # over a plane through collar bones and the seventh vertebra of the neck
     low = _ease((-98 - height) / 62)
     throat = np.exp(-(((z + 111) / 15) ** 2) / 2 - (x / 34) ** 2 / 2) * _ease((y + 56) / 24) * _ease((40 - y) / 60)
-    neck = _ease((-72 - height) / 30) * _ease((-height + 215) / 60 - 0.25)
-    wider = _BROADER * neck * _ease((-128 - z) / -30) + 0.0
+    wider = _BROADER * _ease((-72 - height) / 30) * _ease((z + 128) / 30)
     out = points.copy()
     out[:, 0] += wider * x
     out[:, 1] += _THROAT_BACK * throat - _FORWARD * low
@@ -94,8 +93,7 @@ def finish_neck(layout: Layout, x: np.ndarray) -> None:
     """Set the neck upright and the bust longer, then stroke the brushes over them, along the skin's normals (left side)."""
     x[:] = _upright(x)
     _longer_bust(layout, x)
-    whole = both_sides(_even_throat(layout, both_sides(x[layout.left]))[layout.left])
-    x[:] = whole
+    x[:] = whole = both_sides(_even_throat(layout, both_sides(x[layout.left]))[layout.left])
     triangles = Mesh(whole, layout.faces).triangles
     skin, normal = Surface(whole, triangles), vertex_normals(whole, triangles)
     out = np.zeros(layout.count)
