@@ -18,8 +18,6 @@ NOT_YET = {
     "parts' cuts",
     "smooth skin's cuts",
     "teeth, tongue outside bag",
-    "muscles out of room",
-    "muscle out of skin",
 }
 
 

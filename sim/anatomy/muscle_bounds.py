@@ -18,6 +18,8 @@ THIN = 0.1
 REACH = 2
 #: Power of the softened minimum; mm a belly may be moved.
 SOFT, SHIFT = 6.0, 4.0
+#: mm from a wall within which it is asked for at all where bellies give way.
+NEAR = 1.5
 
 
 @dataclass(eq=False)
@@ -162,15 +164,23 @@ def eased(fibres: list[np.ndarray], keep, clear, rings, room: Room, rounds: int 
         for each, default in ((keep, 1.0), (clear, 0.0))
     )
     normal = np.concatenate([sheet_normals(f, ring).reshape(-1, 3) for f, ring in zip(fibres, rings, strict=True)])
+    reach = float(wanted.max(initial=0.0)) + 2 * NEAR
+    slack = np.zeros(len(at))
     for _ in range(rounds):
         push = np.zeros_like(at)
-        for distance, away in room.walls(at):
-            push += np.clip(wanted - distance, 0, 2.0)[:, None] * away
+        ask = np.flatnonzero(slack < 0.1)  # the others were farther from walls than they have moved since
+        slack[ask] = reach - NEAR
+        for distance, away in room.walls(at[ask], reach):
+            lack = wanted[ask] - distance
+            slack[ask] = np.minimum(slack[ask], -lack)
+            push[ask] += np.clip(lack, 0, 2.0)[:, None] * away
         if np.abs(push).max(initial=0) < 0.01:
             break
         across = np.einsum("nj,nj->n", push, normal)[:, None] * normal
         push = across + beside * (push - across)
         parts = [x.reshape(shape) for x, shape in zip(np.split(push, cuts), shapes, strict=True)]
         parts = [smoothed(x, ring, wide) for x, ring in zip(parts, rings, strict=True)]
-        at = at + 1.3 * free[:, None] * np.concatenate([x.reshape(-1, 3) for x in parts])
+        step = 1.3 * free[:, None] * np.concatenate([x.reshape(-1, 3) for x in parts])
+        at = at + step
+        slack -= np.linalg.norm(step, axis=1)
     return [x.reshape(shape) for x, shape in zip(np.split(at, cuts), shapes, strict=True)]

@@ -41,21 +41,21 @@ class Room:
         """(n, 3) unit direction to the skin's outside, smoothed over some mm."""
         return self.skin.smooth_normal(points)
 
-    def walls(self, points):
+    def walls(self, points, reach: float = 8.0):
         """For each wall near ``points`` (n, 3): mm (n,) they are clear of it (negative: within it), and the way off it.
 
-        The way is (n, 3) unit; where a wall is far the distance is infinite.
+        The way is (n, 3) unit; where a wall is farther than ``reach`` mm the distance is infinite.
         """
         for bone in self.bones:
-            height, away, _ = bone.height(points, 8.0, -0.5)
+            height, away, _ = bone.height(points, reach, -0.5)
             # far from a sharp edge its normal cannot tell inside from outside, and no muscle lies deep in bone
             yield np.where(height > -BURIED, height - BONE_CLEAR, np.inf), away
         for centre, radius in self.eyes:
             away = points - centre
             far = np.linalg.norm(away, axis=1)
             clear = far - radius - EYE_CLEAR
-            yield np.where(clear < 8.0, clear, np.inf), away / np.maximum(far, 1e-9)[:, None]
-        height, away, triangle = self._whole.height(points, 8.0, 0.5)
+            yield np.where(clear < reach, clear, np.inf), away / np.maximum(far, 1e-9)[:, None]
+        height, away, triangle = self._whole.height(points, reach, 0.5)
         clear = np.where(self._lining[triangle], LINING_CLEAR, SKIN_CLEAR)
         yield np.where(np.isfinite(height), -height - clear, np.inf), -away
 
