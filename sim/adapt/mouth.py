@@ -12,6 +12,7 @@ HELD, FREE = 5.0, 22.0  # mm from the teeth: up to where bone goes as they do, a
 BEHIND_LIPS = 12.0  # mm: teeth this near to the skin have lips or cheeks over them
 LIPS = 1.5  # weight of the lips, of all teeth 1, in where the mouth goes
 LIP_LEFT = 0.75  # share of that distance that must remain
+SOUND = 6.0  # mm: who lacks more looks out between the lips, where the skin's side tells nothing
 
 
 def mouth_similarity(rest: Rest, space, fitted):
@@ -35,7 +36,8 @@ def mouth_similarity(rest: Rest, space, fitted):
     shift = np.zeros(3)
     for _ in range(6):
         after, inward, sure = _room_over(teeth @ matrix.T + base + shift, lips)
-        lack = np.where(sure & (np.abs(after) < BEHIND_LIPS), np.maximum(LIP_LEFT * before - after, 0.0), 0.0)
+        lack = np.maximum(LIP_LEFT * before - after, 0.0)
+        lack[~sure | (lack > SOUND)] = 0.0
         if lack.max(initial=0) < 0.1:
             break
         # The least shift that gives room where it lacks, in the mean: one side's gain is not the other's loss.
