@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 SMALLEST, LARGEST = 9.5, 13.0  # mm: from a child of one year to a large adult eye
 LIES = (0.22, 0.94)  # along an eye from its inner corner: where the inner edge of the lids lies on the ball
+BACKS = 1  # edges behind the rim: lid backs that keep near to the ball
 EDGES = (0.08, 0.97)  # where it does on any head
 CORNERS, FADE = (0.06, 1.12), 0.12  # along an eye from its inner corner: where lids lie on the ball; fading in and out
 BESIDE = (0.7, 0.35)  # how much of that holds for the seen lid one and two edges beside the rim
@@ -157,7 +158,8 @@ def lid_contact(rest: "Rest", side: str) -> LidContact:
         reached = grown
     share = _along(head, head.skin.vertices, side)
     edge = np.flatnonzero(rest.rim & (rest.lids(side) > 0.3) & (share > EDGES[0]) & (share < EDGES[1]))
-    contact = LidContact(head.skin.faces, head.skin.triangles, len(lid), stiff, edge)
+    back = np.flatnonzero(rest.inner & (rest.behind <= BACKS) & lid)
+    contact = LidContact(head.skin.faces, head.skin.triangles, len(lid), stiff, edge, back)
     contact.allow(head.skin.vertices, head.eyes["lr".index(side)])
     return contact
 

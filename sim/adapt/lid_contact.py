@@ -18,6 +18,8 @@ from ..mesh_subdivision import smoother
 
 #: mm over the ball that samples of the lids aim at: the inner edge of the margins at least and most, the rest at least.
 EDGE, BEHIND = (0.07, 0.38), 0.05
+#: mm that the lids' backs may stand farther off than they do on the reference.
+NEAR = 0.5
 #: Rounds, those after which the best is kept, and weights of a violated bound and of smoothness against that of moving at all.
 ROUNDS, SETTLED, FIRM, SMOOTH = 30, 20, 3000.0, 0.6
 
@@ -44,9 +46,10 @@ class LidContact:
     faces (m, 4) and triangles (t, 3) : the skin's; count : its vertices
     stiff : (count,) how hard each vertex is to move; infinite: it stays
     edge : (k,) vertices of the inner edge of the margins that lie on the ball
+    back : (b,) vertices of the lids' backs, which stay about as near to it as `allow` finds them (none: they need not)
     """
 
-    def __init__(self, faces, triangles, count: int, stiff, edge):
+    def __init__(self, faces, triangles, count: int, stiff, edge, back=()):
         self.edge = edge
         self.rows = np.flatnonzero(np.isfinite(stiff))
         self.stiff = np.asarray(stiff, float)[self.rows]
@@ -62,11 +65,12 @@ class LidContact:
             @ operator,
         ]
         at_edge = coo_matrix((np.ones(len(edge)), (np.arange(len(edge)), edge)), shape=(len(edge), count)).tocsr()
-        samples = [at_edge, operator[edge], *samples]
+        self.back = np.asarray(back, dtype=int)
+        samples = [at_edge, operator[edge], *samples, operator[self.back]]
         size = [part.shape[0] for part in samples]
         self.all = vstack(samples).tocsr()
-        self.least = np.repeat([EDGE[0], EDGE[0], BEHIND, BEHIND], size)
-        self.most = np.repeat([EDGE[1], EDGE[1], np.inf, np.inf], size)
+        self.least = np.repeat([EDGE[0], EDGE[0], BEHIND, BEHIND, BEHIND], size)
+        self.most = np.repeat([EDGE[1], EDGE[1], np.inf, np.inf, np.inf], size)
         self.own = self.all[:, self.rows].toarray()
         link = _links(faces, count)[self.rows][:, self.rows].toarray()
         self.bend = np.diag(link.sum(axis=1)) - link
@@ -75,6 +79,8 @@ class LidContact:
         """Take what the skin (n, 3) mm of ``eye`` has itself as good enough."""
         height = height_over(self.all @ points, eye) * 12.0 / eye.radius
         self.least, self.most = np.minimum(self.least, height - 1e-6), np.maximum(self.most, height + 1e-6)
+        first = len(height) - len(self.back)
+        self.most[first:] = np.maximum(height[first:], BEHIND) + NEAR
 
     def settled(self, points, eye: Eye, near=None) -> np.ndarray:
         """Skin (n, 3) mm with the lids moved as little as they must to lie on ``eye``.
