@@ -21,7 +21,6 @@ NOT_YET = {
     "teeth, tongue outside bag",
     "muscles out of room",
     "muscle out of skin",
-    "muscle in bone",
     "smooth skin self-cuts",
     "skin self-cuts",
 }
