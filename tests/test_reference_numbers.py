@@ -17,7 +17,6 @@ from headshop.sim.mesh_piercing import piercings, self_piercings
 NOT_YET = {
     "parts' cuts",
     "smooth skin's cuts",
-    "teeth, tongue outside bag",
 }
 
 

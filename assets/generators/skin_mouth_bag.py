@@ -39,8 +39,8 @@ _STAND, _APICAL = (
     (np.array([1.9, 1.7, 1.7, 1.5, 1.2, 1.0, 0.8, 2.8]), np.array([1.3, 1.3, 2.2, 1.8, 1.3, 1.3, 1.3, 1.0])),
 )
 
-#: The same more on the inner side.
-_INNER = 0.5
+#: The same toward the roots more on the inner side, and outward more beside the last molar above.
+_INNER, _LAST = 0.5, 1.0
 
 #: How much the cage keeps to the places wanted of the limit surface, by steps from the middle to the corner: free of
 #: this it would swing and cut itself.
@@ -88,5 +88,7 @@ def _necks(places, past, apical, line):
     for way, down in ((1, apical), (-1, apical + _INNER)):
         points = neck_line(places, np.array(_ALONG), past, way, _STAND, down[:, None])
         points[0, 0] = 0.0
+        if way > 0 and places[0].axis[2] > 0:
+            points[-1, 0] += _LAST
         out.append(points - line)
     return np.array(out)
