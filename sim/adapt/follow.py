@@ -16,7 +16,7 @@ from ..anatomy.tissue_depth import tissue_vectors
 from ..progress import Progress, Work
 from . import bone, eyeballs
 from .bone_inside import keep_inside
-from .lining import lined, lips_met
+from .lining import lined, lips_met, lips_parted
 from .mouth import mouth_similarity, with_teeth
 from .muscles import carried_muscles
 from .rest import BONES, TEETH, Rest, rest_of
@@ -86,6 +86,7 @@ def follow(reference: Head, skin: np.ndarray, unseen: np.ndarray | None = None) 
     shut = rest.rim & lining  # where lips meet is seen, a fold behind them is not
     final = restored(rest, final, unseen, scale)
     final = untangled(rest, final, seen & ~unseen, shut)
+    final = lips_parted(rest, final, size)
     for eye, side in zip(eyes, "lr", strict=True):
         final = eyeballs.settled_lids(rest, final, eye, side)
     parts["skin"] = final
