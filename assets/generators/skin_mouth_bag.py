@@ -40,7 +40,7 @@ _STAND, _APICAL = (
 )
 
 #: The same toward the roots more on the inner side, and outward more beside the last molar above.
-_INNER, _LAST = 0.5, 1.0
+_INNER, _LAST = 0.5, 0.3
 
 #: How much the cage keeps to the places wanted of the limit surface, by steps from the middle to the corner: free of
 #: this it would swing and cut itself.
