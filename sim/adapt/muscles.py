@@ -1,15 +1,24 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Muscles under a fitted skin: warped with the space between skin and bone, then kept in it (Kähler 2002, 5.2, item 3)."""
 
+from dataclasses import replace
+
 import numpy as np
+from scipy.sparse import coo_matrix, diags
 
 from ..anatomy.head import Muscle
+from ..anatomy.inside import inside
 from ..anatomy.muscle_bounds import eased
 from ..anatomy.muscle_room import Room
 from ..anatomy.muscle_shape import all_reshaped
+from ..mesh import edges
+from .bone import depth_under
+from .closest import Surface
 from .rest import BONES, Rest
 
 CLEAR = 0.15  # mm a fibre keeps from the walls of its room, at least
+UNDER = 0.1  # mm under skin and lining to which a belly that came out of them is drawn back
+LOST = 3.0  # mm: nothing comes out farther
 
 
 def carried_muscles(rest: Rest, parts, eyes, warp) -> tuple[Muscle, ...]:
@@ -33,4 +42,41 @@ def carried_muscles(rest: Rest, parts, eyes, warp) -> tuple[Muscle, ...]:
         beside=0.25,
     )
     centres = [None if m.centre is None else warp.transform(m.centre[None])[0] for m in muscles]
-    return tuple(all_reshaped(muscles, fibres, room, centres))
+    return drawn_in(tuple(all_reshaped(muscles, fibres, room, centres)), skin)
+
+
+def drawn_in(muscles: tuple[Muscle, ...], skin, rounds: int = 6) -> tuple[Muscle, ...]:
+    """``muscles`` with the last of their bellies drawn back under the skin and its linings (``skin``, a mesh).
+
+    At the bottom of the narrow slits between lips and gums no normal tells inside from outside; the winding number does.
+    What is out takes its neighbours along.
+    """
+    surface = Surface(skin.vertices, skin.triangles)
+    at = np.concatenate([m.shape.vertices for m in muscles])
+    cuts = np.cumsum([len(m.shape.vertices) for m in muscles])
+    first = np.concatenate([[0], cuts[:-1]])
+    pairs = np.concatenate([edges(m.shape.faces) + start for m, start in zip(muscles, first, strict=True)])
+    link = coo_matrix((np.ones(2 * len(pairs)), (pairs.ravel("F"), pairs[:, ::-1].ravel("F"))), shape=(len(at),) * 2)
+    link = link.tocsr()
+    mean = diags(1 / np.maximum(np.asarray(link.sum(axis=1)).ravel(), 1)) @ link
+    ask = np.arange(len(at))
+    for _ in range(rounds):
+        depth, found = depth_under(at[ask], surface, LOST)
+        out = np.flatnonzero(depth < 0)
+        out = out[~inside(at[ask[out]], skin.vertices, skin.triangles)]
+        rows = ask[out]
+        if len(rows) == 0:
+            break
+        gap = found.points[out] - at[rows]
+        way = gap / np.maximum(np.linalg.norm(gap, axis=1, keepdims=True), 1e-9)
+        push = np.zeros_like(at)
+        push[rows] = gap + UNDER * way
+        spread = push
+        for _ in range(2):
+            spread = mean @ spread
+            spread[rows] = push[rows]
+        at = at + spread
+        ask = np.flatnonzero(np.abs(spread).max(axis=1) > 1e-4)
+    return tuple(
+        replace(m, shape=m.shape.moved(vertices)) for m, vertices in zip(muscles, np.split(at, cuts[:-1]), strict=True)
+    )
