@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Ten random individuals keep every number that the reference keeps."""
 
-import os
-
 import numpy as np
 import pytest
 
@@ -11,19 +9,7 @@ from headshop.sim.health.cuts import self_cuts, smooth_skin
 from headshop.sim.health.numbers import LIMITS, numbers
 from headshop.sim.scan.individual import individual
 
-#: Ten take two minutes: all of them where CI or HEADSHOP_REBUILD is set.
-PEOPLE = 10 if {"CI", "HEADSHOP_REBUILD"} & set(os.environ) else 3
-
-#: Numbers that these heads do not keep yet.
-NOT_YET = {
-    "parts' cuts",
-    "smooth skin's cuts",
-    "teeth, tongue outside bag",
-    "muscles out of room",
-    "muscle out of skin",
-    "smooth skin self-cuts",
-    "skin self-cuts",
-}
+PEOPLE = 10
 
 
 @pytest.fixture(scope="module")
@@ -37,9 +23,7 @@ def found(reference, people):
 
 
 @pytest.mark.parametrize("name", LIMITS)
-def test_individuals_keep_their_numbers(found, name, request):
-    if name in NOT_YET:
-        request.applymarker(pytest.mark.xfail(strict=False, reason="not yet"))
+def test_individuals_keep_their_numbers(found, name):
     wrong = {k: (n.values[name], n.details.get(name, "")) for k, n in enumerate(found) if name in n.faults()}
     assert not wrong, wrong
 

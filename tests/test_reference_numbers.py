@@ -13,9 +13,6 @@ from headshop.sim.health.muscles import muscle_room
 from headshop.sim.health.numbers import LIMITS, numbers
 from headshop.sim.mesh_piercing import piercings, self_piercings
 
-#: Numbers that this head does not keep yet.
-NOT_YET = {}
-
 
 @pytest.fixture(scope="module")
 def head():
@@ -28,9 +25,7 @@ def found(head):
 
 
 @pytest.mark.parametrize("name", LIMITS)
-def test_the_reference_keeps_its_numbers(found, name, request):
-    if name in NOT_YET:
-        request.applymarker(pytest.mark.xfail(strict=False, reason="not yet"))
+def test_the_reference_keeps_its_numbers(found, name):
     assert name not in found.faults(), (found.values[name], found.details.get(name, ""))
 
 
