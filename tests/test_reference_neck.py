@@ -25,7 +25,7 @@ def grown():
     skin = Surface(with_.vertices, with_.triangles)
     out = {}
     for name, line, *_ in skin_neck.BRUSHES:
-        start = Surface(without.vertices, without.triangles).closest(np.array(line, float))
+        start = Surface(without.vertices, without.triangles).closest(skin_neck._upright(np.array(line, float)))
         end = skin.closest(start.points)
         out[name] = float(((end.points - start.points) * start.normals).sum(axis=1).mean())
     edge = np.abs(brushed - plain)[layout.edge].max()

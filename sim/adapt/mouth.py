@@ -8,7 +8,10 @@ from .refine import scattered
 from .rest import TEETH, Rest
 from .thin_plate_spline import similarity
 
-HELD, FREE = 5.0, 22.0  # mm from the teeth: up to where bone goes as they do, and from where it goes its own way
+HELD, FREE = (
+    3.0,
+    14.0,
+)  # mm from teeth and their roots: up to where bone goes as they do, and from where it goes its own way
 BEHIND_LIPS = 12.0  # mm: teeth this near to the skin have lips or cheeks over them
 LIPS = 1.5  # weight of the lips, of all teeth 1, in where the mouth goes
 LIP_LEFT = 0.75  # share of that distance that must remain
