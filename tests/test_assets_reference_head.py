@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from headshop.assets.generators.eye_frame import RADIUS, eye_frames
-from headshop.assets.generators.make_reference_head import rounded
+from headshop.assets.generators.steps import rounded
 from headshop.assets.generators.skin import make_skin
 from headshop.assets.generators.skin_layout import skin_layout
 from headshop.assets.generators.skin_norms import norms

@@ -32,6 +32,7 @@ def make_anatomy(skin: Mesh, groups: dict[str, np.ndarray], landmarks: dict[str,
     """
     from . import eyes, mandible, muscles, skull, teeth, tongue
     from .bone_cover import covered
+    from .steps import rounded, stepped
 
     yield Progress(0.0, "Skull")
     cranium = covered(skull.make_skull(skin, groups, landmarks), skin, groups["inner"])
@@ -53,6 +54,8 @@ def make_anatomy(skin: Mesh, groups: dict[str, np.ndarray], landmarks: dict[str,
         "tongue": tongue.make_tongue(skin, groups, landmarks, upper, lower),
     }
     yield Progress(0.7, "Muscles")
+    parts, jaw, eye_frames = {name: rounded(mesh) for name, mesh in parts.items()}, stepped(jaw), stepped(eye_frames)
     bones = {name: mesh.vertices for name, mesh in parts.items()}
-    made = muscles.make_muscles(skin, groups, landmarks, parts, points.on(bones), jaw, eye_frames)
+    marks = stepped(points.on(bones))
+    made = muscles.make_muscles(skin, groups, landmarks, parts, marks, jaw, eye_frames)
     return Anatomy(parts, points, made, jaw, eye_frames)

@@ -9,7 +9,7 @@ from ...sim.adapt.skin_cover import SkinCover
 from ...sim.mesh import Mesh
 
 #: mm of tissue over bone: under the skin one sees, and behind linings.
-SEEN, LINING = 1.4, 0.7
+SEEN, LINING = 1.4, 1.15
 
 
 def covered(bone: Mesh, skin: Mesh, inner: np.ndarray) -> Mesh:

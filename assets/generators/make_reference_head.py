@@ -1,35 +1,28 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Make ``assets/reference_head.npz`` anew: ``python -m headshop.assets.generators.make_reference_head [FILE]``.
 
-The skin comes first; bone, eyes, teeth, tongue and muscles are grown under it. Same code, same bytes: positions are
-rounded so that the last bits, which differ from one processor's linear algebra to another's, are not kept.
+The skin comes first; bone, eyes, teeth, tongue and muscles are grown under it. Same code, same bytes: see `steps`.
 """
 
 import sys
-from dataclasses import replace
-
-import numpy as np
 
 from ...sim.anatomy.head import Head
 from ...sim.anatomy.storage import REFERENCE, save_head
-from ...sim.mesh import Mesh
 from ...sim.progress import finish
 from .anatomy import make_anatomy
 from .skin import make_skin
-
-#: Digits of a millimetre that are kept.
-DIGITS = 5
+from .steps import rounded, stepped
 
 
 def make_reference_head() -> Head:
     """The reference head, mm, in its standard posture (origin midway between the tragia, Frankfurt horizontal)."""
     skin = make_skin()
-    landmarks = skin.landmarks.on({"skin": skin.mesh.vertices})
-    anatomy = finish(make_anatomy(skin.mesh, skin.groups, landmarks))
-    parts = {"skin": skin.mesh, **anatomy.parts}
+    mesh, groups = rounded(skin.mesh), stepped(skin.groups)
+    anatomy = finish(make_anatomy(mesh, groups, stepped(skin.landmarks.on({"skin": mesh.vertices}))))
+    parts = {"skin": mesh, **anatomy.parts}
     return Head(
         parts={name: rounded(mesh) for name, mesh in parts.items()},
-        groups=skin.groups,
+        groups=groups,
         landmarks=skin.landmarks,
         skull_landmarks=anatomy.skull_landmarks,
         feature_mesh=skin.feature_mesh,
@@ -37,12 +30,6 @@ def make_reference_head() -> Head:
         jaw=anatomy.jaw,
         eyes=anatomy.eyes,
     )
-
-
-def rounded(mesh: Mesh) -> Mesh:
-    """``mesh`` with positions in steps of 10 nm and texture coordinates in millionths."""
-    uv = None if mesh.uv is None else np.round(mesh.uv.astype(float), 6).astype(np.float32)
-    return replace(mesh, vertices=np.round(mesh.vertices, DIGITS), uv=uv)
 
 
 def main(argv: list[str]) -> int:

@@ -12,7 +12,7 @@ from .teeth_places import ToothPlace
 #: The crest of the ridge lies this far from the necks toward the roots, mm, or more where the lining wants it.
 CREST = 1.6
 #: mm between the ridge and the lining of the mouth: at its crest and at its walls, whose faces are large.
-LINING, WALL = 0.7, 1.0
+LINING, WALL = 1.15, 1.0
 #: Least tissue over the roots, mm.
 THIN = 4.0
 #: mm that walls are looked for from the middle of the ridge outward, and from its crest toward the roots.

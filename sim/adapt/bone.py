@@ -10,7 +10,7 @@ from .thin_plate_spline import ThinPlateSpline
 
 #: mm of tissue that always remain over bone: at the very least, where the reference has little, where it has more.
 LEAST, THIN, THICK = 1.12, 1.25, 2.0
-LINING = 0.45  # mm, toward what lines mouth, lids and nostrils
+LINING = 1.12  # mm, toward what lines mouth, lids and nostrils
 NEAR = 12.0  # mm: bone deeper than this needs no test
 
 

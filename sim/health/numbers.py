@@ -24,7 +24,7 @@ LIMITS: dict[str, tuple[float | None, float | None]] = {
     "teeth off rigid": (0, 0.01),
     "bone outside": (0, 0),
     "bone cover": (1.0, None),
-    "bone to lining": (0.0, None),
+    "bone to lining": (1.0, None),
     "muscles out of room": (0, 0),
     "muscle out of skin": (0, muscles.TOUCH),
     "muscle in bone": (0, muscles.SLACK),
