@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 
 from headshop.assets.generators.eye_frame import RADIUS, eye_frames
-from headshop.assets.generators.steps import rounded
 from headshop.assets.generators.skin import make_skin
 from headshop.assets.generators.skin_layout import skin_layout
 from headshop.assets.generators.skin_norms import norms
+from headshop.assets.generators.steps import rounded
 from headshop.sim.anatomy.eyeball import reach
 from headshop.sim.anatomy.head import PARTS, SKIN_GROUPS
 from headshop.sim.anatomy.landmark_names import SKIN, SKULL, mirrored
