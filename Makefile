@@ -18,6 +18,9 @@ endif
 PY := $(VENV)/bin/python
 READY := $(VENV)/.ready
 
+# Several threads of linear algebra sum in another order, and the texture map relaxes to another state.
+ONE := OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1
+
 .PHONY: demo test check assets sheets extension bench clean
 
 demo: $(READY)
@@ -31,8 +34,8 @@ check: $(READY)
 	$(PY) -m ruff format --check .
 
 assets: $(READY)
-	$(PY) -m headshop.assets.generators.make_reference_head
-	$(PY) -m headshop.assets.generators.make_strengths
+	$(ONE) $(PY) -m headshop.assets.generators.make_reference_head
+	$(ONE) $(PY) -m headshop.assets.generators.make_strengths
 
 sheets: $(READY)
 	$(PY) -m headshop.assets.generators.sheets out/sheets
