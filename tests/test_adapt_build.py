@@ -204,8 +204,12 @@ def test_the_same_scan_moved_gives_the_same_head_moved(reference, coarse):
     for part in one.parts:
         off = np.linalg.norm((other.parts[part].vertices - shift) @ turn - one.parts[part].vertices, axis=1)
         assert off.max() < 0.1, part
-    for a, b in zip(one.muscles, other.muscles, strict=True):
-        np.testing.assert_allclose((b.fibres - shift) @ turn, a.fibres, atol=0.3)
+    off = [
+        np.linalg.norm((b.fibres - shift) @ turn - a.fibres, axis=2).ravel()
+        for a, b in zip(one.muscles, other.muscles, strict=True)
+    ]
+    off = np.concatenate(off)  # a point between two walls may give way to the other one
+    assert np.quantile(off, 0.99) < 0.1 and off.max() < 1.0
     np.testing.assert_allclose((other.eyes[0].centre - shift) @ turn, one.eyes[0].centre, atol=0.01)
 
 
