@@ -19,9 +19,8 @@ def make_reference_head() -> Head:
     skin = make_skin()
     mesh, groups = rounded(skin.mesh), stepped(skin.groups)
     anatomy = finish(make_anatomy(mesh, groups, stepped(skin.landmarks.on({"skin": mesh.vertices}))))
-    parts = {"skin": mesh, **anatomy.parts}
     return Head(
-        parts={name: rounded(mesh) for name, mesh in parts.items()},
+        parts={"skin": mesh, **anatomy.parts},
         groups=groups,
         landmarks=skin.landmarks,
         skull_landmarks=anatomy.skull_landmarks,

@@ -6,7 +6,7 @@ the widths and depths of adult arches; the turns were chosen near those of Andre
 Orthodontics 62:296).
 """
 
-from functools import cache
+from functools import cache, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -172,22 +172,35 @@ def _row(teeth, shape, front, up, edges):
     from .teeth_contact import CONTACT, Touch, first_touch
 
     line, places, start = _Line(shape), [], 0.0
+
+    def place(tooth, edge, way):
+        return _place(tooth, line.at(way), line.at(line.end(way, tooth.md)), front, up, edge)
+
     for tooth, edge in zip(teeth, edges, strict=True):
-
-        def place(way, tooth=tooth, edge=edge):
-            return _place(tooth, line.at(way), line.at(line.end(way, tooth.md)), front, up, edge)
-
+        at = partial(place, tooth, edge)
         before = Touch(places[-1:]) if places else None
         if before is None:
             # the middle incisors touch their own mirror images
-            way = -first_touch(lambda w: Touch([place(-w)], mirrored=True).gap(place(-w)), -1.0, 0.5)  # noqa: B023 (used at once)
+            way = -first_touch(partial(_mirror_gap, at), -1.0, 0.5)
         else:
-            way = start - first_touch(lambda w: before.gap(place(start - w)), -1.2, 1.0)  # noqa: B023 (used at once)
-        places.append(place(way))
+            way = start - first_touch(partial(_gap, before, at, start), -1.2, 1.0)
+        places.append(at(way))
         if before is None:
             places[0] = places[0]._replace(neck=places[0].neck + [CONTACT / 2 - _innermost(places[0]), 0, 0])
         start = line.end(way, tooth.md)
     return places
+
+
+def _mirror_gap(at, way):
+    """mm between the tooth ``at`` puts ``way`` before the midline and its mirror image."""
+    from .teeth_contact import Touch
+
+    return Touch([at(-way)], mirrored=True).gap(at(-way))
+
+
+def _gap(before, at, start, way):
+    """mm between the tooth ``before`` and the one ``at`` puts ``way`` nearer than ``start``."""
+    return before.gap(at(start - way))
 
 
 def _innermost(place):
