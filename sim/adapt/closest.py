@@ -6,6 +6,7 @@ triangles that own the nearest samples are the candidates, and the covering radi
 """
 
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 from scipy.sparse import coo_matrix
@@ -13,9 +14,11 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from ..mesh import vertex_normals
-from ..triangle_projection import closest_on_triangles
+from ..triangle_projection import Triangles
 
 SAMPLES = 160_000  # a finer cover does not pay for the time its tree takes
+FIRST = 8  # nearest samples of a point that are looked at before it is known how many more must be
+BATCH = 4000  # points whose lists of samples are held at once
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +58,7 @@ def weld(vertices: np.ndarray, triangles: np.ndarray, tolerance: float = 1e-5):
 
 
 def spread(corners: np.ndarray, spacing: float):
-    """Sample points over triangles (m, 3, 3) -> points (s, 3), owner (s,), covering radius in mm."""
+    """Sample points over triangles (m, 3, 3) -> points (s, 3), owner (s,), covering radius (m,) in mm."""
     middle = corners.mean(axis=1)
     reach = np.sqrt(((corners - middle[:, None]) ** 2).sum(2).max(1))
     parts = np.clip(np.ceil(reach / spacing), 1, 24).astype(int)
@@ -73,7 +76,21 @@ def spread(corners: np.ndarray, spacing: float):
         weights = np.stack([1 - b - c, b, c], axis=1)
         points.append(np.einsum("sk,mkx->msx", weights, corners[of]).reshape(-1, 3))
         owner.append(np.repeat(of, len(weights)))
-    return np.concatenate(points), np.concatenate(owner), float((reach / parts).max())
+    return np.concatenate(points), np.concatenate(owner), reach / parts
+
+
+def least(row, cost):
+    """The rows (r,) that occur in ``row`` (k,), ascending, and where the first of the least ``cost`` (k,) of each is.
+
+    ``row`` must be in ascending order.
+    """
+    if len(row) == 0:
+        return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
+    start = np.flatnonzero(np.concatenate([[True], row[1:] != row[:-1]]))
+    lowest = np.minimum.reduceat(cost, start)
+    is_least = np.flatnonzero(cost == np.repeat(lowest, np.diff(np.append(start, len(row)))))
+    first = is_least[np.concatenate([[True], row[is_least][1:] != row[is_least][:-1]])]
+    return row[first], first
 
 
 class Surface:
@@ -98,8 +115,10 @@ class Surface:
         self.normals = self._smoothed(smooth)
         # Finer than the triangles where there are few: less to try for each query.
         spacing = max(float(np.median(np.sqrt(double))), 1e-6) * (0.55 if len(double) < 30_000 else 0.75)
-        samples, self._owner, self._radius = spread(self.corners, spacing)
-        self._tree = cKDTree(samples)
+        self._samples, self._owner, self._cover = spread(self.corners, spacing)
+        self._radius = float(self._cover.max())
+        self._tree = cKDTree(self._samples)
+        self._solid = Triangles(self.corners)
 
     def _topology(self):
         n = len(self.vertices)
@@ -133,6 +152,7 @@ class Surface:
         out.__dict__.update(self.__dict__)
         out.triangles = self.triangles[:, ::-1]
         out.corners = self.corners[:, ::-1]
+        out._solid = Triangles(out.corners)
         out.normals, out.face_normals = -self.normals, -self.face_normals
         return out
 
@@ -165,57 +185,90 @@ class Surface:
         best = np.full(len(points), np.inf)
         triangle, weights = np.full(len(points), -1), np.zeros((len(points), 3))
 
-        def improve(row, owner):
-            """Let the pairs of query and triangle compete."""
-            row, owner = np.divmod(np.unique(row * len(self.triangles) + owner), len(self.triangles))
-            a, b, c = (self.corners[owner, k] for k in range(3))
-            w, d = closest_on_triangles(points[row], a, b, c)
-            order = np.lexsort((d, row))
-            at, first = np.unique(row[order], return_index=True)
-            pick = order[first]
+        def improve(row, owner, far):
+            """Let the pairs of query and triangle compete, if their nearest sample is near enough."""
+            some = np.flatnonzero(far - self._cover[owner] < best[row])
+            row, owner = self._once(row[some], owner[some])
+            w, d = self._solid.closest(points, row, owner)
+            at, pick = least(row, d)
             better = d[pick] < best[at]
             at, pick = at[better], pick[better]
             best[at], triangle[at], weights[at] = d[pick], owner[pick], w[pick]
 
-        near = min(4, self._tree.n)
-        far, sample = self._tree.query(points, k=near, distance_upper_bound=reach + self._radius)
-        far, sample = far.reshape(len(points), -1), sample.reshape(len(points), -1)
-        row, column = np.nonzero(np.isfinite(far))
-        improve(row, self._owner[sample[row, column]])
+        far, sample = self._nearest(points, FIRST, reach)
+        near = np.flatnonzero(np.isfinite(far[:, 0]))
+        improve(near, self._owner[sample[near, 0]], far[near, 0])
+        row, column = np.nonzero(np.isfinite(far[:, 1:]))
+        improve(row, self._owner[sample[row, column + 1]], far[row, column + 1])
         # No other triangle can be nearer than its nearest sample less the covering radius; where that leaves doubt,
         # all triangles with a sample in the ball of doubt are tried.
         doubt = np.flatnonzero((far[:, -1] - self._radius < best) & np.isfinite(far[:, -1]))
-        for start in range(0, len(doubt), 4000):
-            at = doubt[start : start + 4000]
-            lists = self._tree.query_ball_point(points[at], best[at] + self._radius, return_sorted=False)
-            size = np.fromiter(map(len, lists), dtype=np.int64, count=len(lists))
-            improve(np.repeat(at, size), self._owner[np.concatenate([np.asarray(x, dtype=np.int64) for x in lists])])
+        for start in range(0, len(doubt), BATCH):
+            at = doubt[start : start + BATCH]
+            row, sample = self._within(points[at], best[at] + self._radius)
+            off = points[at[row]] - self._samples[sample]
+            improve(at[row], self._owner[sample], np.sqrt(np.einsum("ij,ij->i", off, off)))
         found = np.flatnonzero(best <= reach)
         return self._contacts(len(points), found, best[found], triangle[found], weights[found])
+
+    def _nearest(self, points, count, reach):
+        """Distance (k, count) and index (k, count) of the samples nearest to points (k, 3), infinite beyond reach."""
+        count = min(count, self._tree.n)
+        far, sample = self._tree.query(points, k=count, distance_upper_bound=reach + self._radius)
+        return far.reshape(len(points), -1), sample.reshape(len(points), -1)
+
+    def _within(self, points, reach):
+        """Pairs of a point and a sample no farther than ``reach`` mm from it: (p,) and (p,)."""
+        lists = self._tree.query_ball_point(points, reach, return_sorted=False)
+        size = np.fromiter(map(len, lists), dtype=np.int64, count=len(lists))
+        flat = np.fromiter(chain.from_iterable(lists), dtype=np.int64, count=int(size.sum()))
+        return np.repeat(np.arange(len(lists)), size), flat
+
+    def _once(self, row, owner):
+        """Each pair of a point and a triangle once, in order."""
+        pair = np.sort(row.astype(np.int64) * len(self.triangles) + owner)
+        if len(pair):
+            pair = pair[np.concatenate([[True], pair[1:] != pair[:-1]])]
+        return np.divmod(pair, len(self.triangles))
 
     def ranked(
         self, points, normals, reach: float, agreement: float = 0.5, near: int = 24, bend: float = 1.0
     ) -> Contacts:
         """The best place for each point: near, and facing the same way.
 
-        Among the triangles around each point those whose normal agrees with ``normals`` (k, 3) by at least
-        ``agreement`` (cosine) compete by distance x (1 + bend (1 - cosine)).
+        Among the triangles of the ``near`` samples nearest to each point those whose normal agrees with ``normals``
+        (k, 3) by at least ``agreement`` (cosine) compete by distance x (1 + bend (1 - cosine)).
         """
         points = np.asarray(points, dtype=float).reshape(-1, 3)
-        far, sample = self._tree.query(points, k=min(near, self._tree.n), distance_upper_bound=reach + self._radius)
-        row, column = np.nonzero(np.isfinite(far.reshape(len(points), -1)))
-        owner = self._owner[sample.reshape(len(points), -1)[row, column]]
-        row, owner = np.divmod(np.unique(row.astype(np.int64) * len(self.triangles) + owner), len(self.triangles))
-        a, b, c = (self.corners[owner, k] for k in range(3))
-        weights, distance = closest_on_triangles(points[row], a, b, c)
-        normal = np.einsum("kij,ki->kj", self.normals[self.triangles[owner]], weights)
-        cosine = np.einsum("ij,ij->i", normal, normals[row]) / np.maximum(np.linalg.norm(normal, axis=1), 1e-12)
-        keep = np.flatnonzero((cosine >= agreement) & (distance <= reach))
-        cost = distance[keep] * (1 + bend * (1 - cosine[keep]))
-        order = keep[np.lexsort((cost, row[keep]))]
-        at, first = np.unique(row[order], return_index=True)
-        pick = order[first]
-        return self._contacts(len(points), at, distance[pick], owner[pick], weights[pick])
+        best = np.full(len(points), np.inf)
+        triangle, weights, distance = np.full(len(points), -1), np.zeros((len(points), 3)), np.full(len(points), np.inf)
+
+        def improve(row, owner, far):
+            # What costs no less than the best so far even if it faced the same way needs no look.
+            some = np.flatnonzero(far - self._cover[owner] < best[row])
+            row, owner = self._once(row[some], owner[some])
+            w, d = self._solid.closest(points, row, owner)
+            normal = np.einsum("kij,ki->kj", self.normals[self.triangles[owner]], w)
+            cosine = np.einsum("ij,ij->i", normal, normals[row])
+            cosine /= np.maximum(np.sqrt(np.einsum("ij,ij->i", normal, normal)), 1e-12)
+            cost = np.where((cosine >= agreement) & (d <= reach), d * (1 + bend * (1 - cosine)), np.inf)
+            at, pick = least(row, cost)
+            better = cost[pick] < best[at]
+            at, pick = at[better], pick[better]
+            best[at], triangle[at], weights[at], distance[at] = cost[pick], owner[pick], w[pick], d[pick]
+
+        first = min(FIRST, near)
+        far, sample = self._nearest(points, first, reach)
+        for columns in (slice(0, 2), slice(2, first)):
+            row, column = np.nonzero(np.isfinite(far[:, columns]))
+            improve(row, self._owner[sample[:, columns][row, column]], far[:, columns][row, column])
+        doubt = np.flatnonzero((far[:, -1] - self._radius < best) & np.isfinite(far[:, -1]))
+        if near > first and len(doubt):
+            far, sample = self._nearest(points[doubt], near, reach)
+            row, column = np.nonzero(np.isfinite(far))
+            improve(doubt[row], self._owner[sample[row, column]], far[row, column])
+        at = np.flatnonzero(triangle >= 0)
+        return self._contacts(len(points), at, distance[at], triangle[at], weights[at])
 
     def crossings(self, origins, directions, reach: float):
         """All crossings of the lines ``origin + t direction``, -reach <= t <= reach, with the surface.
@@ -228,13 +281,8 @@ class Surface:
         stations = np.arange(-reach, reach + step, step)
         ball = float(np.hypot(step / 2, self._radius) + self._radius)
         at = (origins[:, None] + stations[None, :, None] * directions[:, None]).reshape(-1, 3)
-        lists = self._tree.query_ball_point(at, ball, return_sorted=False)
-        size = np.fromiter(map(len, lists), dtype=np.int64, count=len(lists))
-        if size.sum() == 0:
-            return np.zeros(0, int), np.zeros(0), np.zeros(0, int), np.zeros((0, 3))
-        line = np.repeat(np.arange(len(at)) // len(stations), size)
-        owner = self._owner[np.concatenate([x for x in lists if x]).astype(np.int64)]
-        line, owner = np.divmod(np.unique(line * len(self.triangles) + owner), len(self.triangles))
+        station, sample = self._within(at, ball)
+        line, owner = self._once(station // len(stations), self._owner[sample])
         a, ab = self.corners[owner, 0], self.corners[owner, 1] - self.corners[owner, 0]
         ac, d, o = self.corners[owner, 2] - a, directions[line], origins[line]
         p = np.cross(d, ac)

@@ -1,0 +1,115 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What makes adaptation fast changes nothing: against brute force, in blocks of any size, twice the same."""
+
+import numpy as np
+import pytest
+from scipy.spatial import ConvexHull
+
+from headshop.sim import triangle_projection
+from headshop.sim.adapt import closest
+from headshop.sim.adapt.closest import Surface, least
+from headshop.sim.triangle_projection import Triangles, closest_on_triangles
+
+
+@pytest.fixture
+def uneven():
+    """A ball with triangles of very different sizes, and points on, near and far from it."""
+    rng = np.random.default_rng(4)
+    points = rng.normal(size=(700, 3)) * [1, 1, 0.2] + np.array([[0, 0, 0.9]]) * (rng.random((700, 1)) > 0.4)
+    points = 80 * points / np.linalg.norm(points, axis=1, keepdims=True)
+    hull = ConvexHull(points)
+    a, b, c = (points[hull.simplices[:, k]] for k in range(3))
+    out = np.einsum("ij,ij->i", np.cross(b - a, c - a), a) > 0
+    triangles = np.where(out[:, None], hull.simplices, hull.simplices[:, ::-1])
+    queries = np.concatenate([rng.normal(0, 60, (60, 3)), a[:60], (a + b + c)[:60] / 3, [[0, 0, 0.0]]])
+    return Surface(points, triangles), queries
+
+
+def every_pair(surface, queries):
+    """Distance (k, m) and weights (k, m, 3) from each query to each triangle."""
+    k, m = len(queries), len(surface.triangles)
+    row, owner = np.repeat(np.arange(k), m), np.tile(np.arange(m), k)
+    weights, distance = closest_on_triangles(queries[row], *surface.corners[owner].transpose(1, 0, 2))
+    return distance.reshape(k, m), weights.reshape(k, m, 3)
+
+
+def test_pairs_agree_with_dense_sampling():
+    rng = np.random.default_rng(0)
+    corners = rng.normal(0, 5, (40, 3, 3))
+    corners[0, 2] = corners[0, 1]  # a line
+    p = rng.normal(0, 8, (40, 3))
+    weights, distance = closest_on_triangles(p, *corners.transpose(1, 0, 2))
+    share = rng.dirichlet(np.full(3, 0.7), 4000)
+    share = np.concatenate([share, np.eye(3), *[np.roll(np.stack([s, 1 - s, 0 * s], 1), k, 1) for k in range(3)
+                                                  for s in [np.linspace(0, 1, 400)]]])  # fmt: skip
+    sampled = np.linalg.norm(np.einsum("sk,mkx->msx", share, corners) - p[:, None], axis=2).min(axis=1)
+    assert (distance <= sampled + 1e-9).all() and (sampled - distance < 0.2).all()
+    at = np.einsum("mk,mkx->mx", weights, corners)
+    np.testing.assert_allclose(np.linalg.norm(at - p, axis=1), distance, atol=1e-9)
+    assert (weights > -1e-12).all()
+    np.testing.assert_allclose(weights.sum(axis=1), 1)
+
+
+def test_blocks_of_pairs_change_nothing(monkeypatch):
+    rng = np.random.default_rng(1)
+    corners, points = rng.normal(0, 5, (300, 3, 3)), rng.normal(0, 8, (50, 3))
+    row, owner = rng.integers(0, 50, 999), rng.integers(0, 300, 999)
+    whole = Triangles(corners).closest(points, row, owner)
+    single = closest_on_triangles(points[row], *corners[owner].transpose(1, 0, 2))
+    monkeypatch.setattr(triangle_projection, "BLOCK", 7)
+    for one, two, three in zip(whole, Triangles(corners).closest(points, row, owner), single, strict=True):
+        np.testing.assert_array_equal(one, two)
+        np.testing.assert_array_equal(one, three)
+
+
+@pytest.mark.parametrize("reach", [np.inf, 30.0])
+def test_closest_is_the_closest_of_all(uneven, reach, monkeypatch):
+    surface, queries = uneven
+    brute = every_pair(surface, queries)[0].min(axis=1)
+    found = surface.closest(queries, reach)
+    np.testing.assert_array_equal(found.found, brute <= reach)
+    np.testing.assert_allclose(found.distance[found.found], brute[brute <= reach], atol=1e-9)
+    monkeypatch.setattr(closest, "FIRST", 2)
+    monkeypatch.setattr(closest, "BATCH", 5)
+    again = surface.closest(queries, reach)
+    np.testing.assert_array_equal(found.distance, again.distance)
+
+
+def test_ranking_is_that_of_all_the_triangles_near(uneven):
+    surface, queries = uneven
+    rng = np.random.default_rng(2)
+    normals = rng.normal(size=queries.shape)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    found = surface.ranked(queries, normals, 90.0, 0.4, near=10**6, bend=1.5)
+    distance, weights = every_pair(surface, queries)
+    normal = np.einsum("kmc,mcx->kmx", weights, surface.normals[surface.triangles])
+    normal /= np.linalg.norm(normal, axis=2, keepdims=True)
+    cosine = np.einsum("kmx,kx->km", normal, normals)
+    cost = np.where((cosine >= 0.4) & (distance <= 90.0), distance * (1 + 1.5 * (1 - cosine)), np.inf)
+    np.testing.assert_array_equal(found.found, np.isfinite(cost.min(axis=1)))
+    rows = np.flatnonzero(found.found)
+    assert len(rows) > 50
+    np.testing.assert_allclose(cost[rows, found.triangle[rows]], cost[rows].min(axis=1), atol=1e-9)
+
+
+def test_lines_through_a_closed_surface_cross_it_twice(uneven):
+    surface, _ = uneven
+    rng = np.random.default_rng(3)
+    origins, ways = rng.normal(0, 5, (40, 3)) + [0, 0, 25], rng.normal(size=(40, 3))
+    ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+    line, t, _, _ = surface.crossings(origins, ways, 200.0)
+    np.testing.assert_array_equal(line, np.repeat(np.arange(40), 2))
+    assert (t[::2] * t[1::2] < 0).all()
+
+
+def test_the_least_of_each_row_and_the_first_of_equals():
+    row, cost = np.array([0, 0, 2, 2, 2, 5]), np.array([3.0, 1.0, 4.0, 2.0, 2.0, np.inf])
+    np.testing.assert_array_equal(least(row, cost), [[0, 2, 5], [1, 3, 5]])
+    assert len(least(row[:0], cost[:0])[0]) == 0
+
+
+def test_the_same_twice(uneven):
+    surface, queries = uneven
+    again = Surface(surface.vertices, surface.triangles)
+    for name, value in vars(surface.closest(queries)).items():
+        np.testing.assert_array_equal(value, getattr(again.closest(queries), name))
