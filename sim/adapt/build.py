@@ -7,12 +7,14 @@ import numpy as np
 
 from ..anatomy.head import Head
 from ..anatomy.landmark_names import SKIN
+from ..detail.maps import SIZE, DetailMaps, detail_maps
 from ..errors import InputError
 from ..mesh import Mesh
 from ..mesh_subdivision import drawn
 from ..progress import Progress, Work, portion
 from .bone import depth_under
 from .closest import Surface
+from .fit_sentence import fit_sentence, fitted_shares, invented
 from .follow import follow
 from .gate import check_against_scan, check_arrangement
 from .landmarks import require_usable
@@ -32,11 +34,13 @@ class BuildResult:
 
     head : the fitted head, in the scan's own place (mm)
     fit : mean_mm, p95_mm, max_mm (skin to scan, where the face has data), coverage (share of the face with data),
-        landmark_mean_mm (given landmarks to the skin's own), and the share ``within_1mm``
+        landmark_mean_mm (given landmarks to the skin's own), the share ``within_1mm``, what was ``invented`` and the
+        ``sentence`` that says all this
     anatomy : muscles (count), skull_penetrations (bone vertices outside the skin), tissue_thickness_mm
     landmarks_missing : names of landmarks that were not given
     attributes : per skin vertex (n,) float32: ``fitted`` 0..1 (0: invented by the warp), ``distance_mm`` to the scan
         (positive outside, NaN where there is no data)
+    detail : displacement and normal map of what is finer than the mesh; None if not asked for
     """
 
     head: Head
@@ -44,10 +48,13 @@ class BuildResult:
     anatomy: dict
     landmarks_missing: tuple[str, ...]
     attributes: dict[str, np.ndarray] = field(default_factory=dict)
+    detail: DetailMaps | None = None
 
 
-def build_head(reference: Head, scan: Mesh, landmarks: dict[str, np.ndarray]) -> Work:
+def build_head(reference: Head, scan: Mesh, landmarks: dict[str, np.ndarray], detail: int = SIZE) -> Work:
     """Work returning the `BuildResult` for a scan (mm, any place) with four or more ``landmarks`` (name -> mm).
+
+    detail : texels along a side of the detail maps; 0 for none
 
     Raises
     ------
@@ -61,17 +68,23 @@ def build_head(reference: Head, scan: Mesh, landmarks: dict[str, np.ndarray]) ->
     check_arrangement(reference.landmark_positions(), given)
     fit = yield from portion(fit_skin(reference, target, given), 0.1, 0.7)
     refuse_poor(fit_report(reference, fit, given))
-    followed = yield from portion(follow(fit.reference, fit.cage, fit.unseen), 0.7, 0.95)
-    yield Progress(0.95, "Checking the anatomy")
+    followed = yield from portion(follow(fit.reference, fit.cage, fit.unseen), 0.7, 0.85)
+    yield Progress(0.85, "Checking the anatomy")
     head = followed.head
     report = fit_report(reference, fit, given, drawn(head.skin.faces, head.skin.vertices))
+    report["invented"] = invented(fitted_shares(head, fit.fitted.fitted))
+    report["sentence"] = fit_sentence(report, report["invented"])
     anatomy = anatomy_report(head)
     missing = tuple(n for n in SKIN if n not in given)
     attributes = {
         "fitted": fit.fitted.fitted.astype(np.float32),
         "distance_mm": fit.fitted.distance.astype(np.float32),
     }
-    return BuildResult(head, report, anatomy, missing, attributes)
+    maps = None
+    if detail and head.skin.uv is not None:
+        maps = yield from portion(detail_maps(head.skin, fit.target, group(head, "inner"), detail), 0.88, 1.0)
+        report["detail"] = maps.report
+    return BuildResult(head, report, anatomy, missing, attributes, maps)
 
 
 def fit_report(reference: Head, fit: SkinFit, given, vertices=None) -> dict:
