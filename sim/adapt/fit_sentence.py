@@ -53,20 +53,22 @@ def fitted_shares(head: Head, fitted: np.ndarray) -> dict[str, float]:
 
 def invented(shares: dict[str, float]) -> list[str]:
     """The regions that the scan did not decide, in words; both sides of a kind together."""
-    words = {}
-    for region, share in shares.items():
-        if share < MOST:
-            words[region] = ("" if share < ALL else "most of the ") + region
+
+    def said(region, share, article="the "):
+        return region if share < ALL else f"most of {article}{region}"
+
     out = []
-    for region, said in words.items():
-        left, right = "left " + region.removeprefix("right "), "right " + region.removeprefix("left ")
-        if region == right and words.get(left, "").startswith("most") == said.startswith("most") and left in words:
-            continue
-        if region == left and right in words and words[right].startswith("most") == said.startswith("most"):
-            plural = region.removeprefix("left ")
-            plural += "" if plural.endswith("s") else "s"
-            said = said.replace("the " + region, "both " + plural) if "most" in said else "both " + plural
-        out.append(said)
+    for region in REGIONS:
+        if region not in SIDED:
+            sides = [region]
+        else:
+            sides = [f"{side} {region}" for side in ("left", "right")]
+        few = {name: shares[name] for name in sides if shares.get(name, 1.0) < MOST}
+        if len(few) == 2 and len({share < ALL for share in few.values()}) == 1:
+            plural = region if region.endswith("s") else region + "s"
+            out.append(said(f"both {plural}", few[sides[0]], ""))
+        else:
+            out += [said(name, share) for name, share in few.items()]
     return out
 
 
