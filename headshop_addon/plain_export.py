@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A head as plain files for programs that have no Blender: meshes as PLY, the rest as JSON, shapes as ``.npz``.
 
-All in mm, Z up, face toward -Y, in the scan's own place. The skin is in triangles between the cage's vertices, each of
-them where it comes to lie on the surface that is drawn, the limit of subdivision; so are landmarks and shapes.
+All in mm, Z up, face toward -Y, in the scan's own place. ``skin.ply`` is the surface as Blender draws it, the cage
+subdivided once, without the lining of the lids that the eyeballs hide. Shapes have the cage's own vertices, each where
+it comes to lie on that surface, the limit of subdivision; landmarks lie there too.
 """
 
 import io
@@ -13,6 +14,7 @@ import numpy as np
 
 from ..sim.adapt.landmarks import write_landmarks
 from ..sim.anatomy.head import Head
+from ..sim.anatomy.seen_skin import seen_skin
 from ..sim.anatomy.storage import write_atomically
 from ..sim.mesh import Mesh
 from ..sim.mesh_subdivision import drawn
@@ -29,10 +31,11 @@ def write_plain(skin: bpy.types.Object, folder) -> None:
     InputError : not a whole head (`heads.read_head`).
     """
     folder = Path(folder)
-    head = as_drawn(heads.read_head(skin))
+    cage = heads.read_head(skin)
+    head = as_drawn(cage)
     report = heads.read_report(skin)
-    for part in ("skin", "skull", "mandible"):
-        mesh = head.parts[part]
+    parts = {"skin": seen_skin(cage), **{part: head.parts[part] for part in ("skull", "mandible")}}
+    for part, mesh in parts.items():
         write_ply(folder / f"{part}.ply", Mesh.from_triangles(mesh.vertices, mesh.triangles))
     write_landmarks(folder / "landmarks.json", head.landmark_positions(), report.get("landmarks_missing", ()))
     write_landmarks(folder / "skull_landmarks.json", head.skull_landmark_positions())

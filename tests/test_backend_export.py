@@ -5,8 +5,10 @@ import json
 
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
 from headshop.sim.adapt.landmarks import read_landmarks
+from headshop.sim.anatomy.seen_skin import behind_lids
 from headshop.sim.mesh_subdivision import drawn
 from headshop.sim.scan.ply import read_ply
 
@@ -74,11 +76,16 @@ def test_plain_files(bpy, skin, tmp_path, reference):
     write_plain(skin, tmp_path)
     assert sorted(p.name for p in tmp_path.iterdir()) == sorted(FILES)
     on_surface = drawn(reference.skin.faces, reference.skin.vertices)
-    for part in ("skin", "skull", "mandible"):
+    for part in ("skull", "mandible"):
         mesh = read_ply(tmp_path / f"{part}.ply")
-        rest = reference.parts[part].vertices
-        np.testing.assert_allclose(mesh.vertices, on_surface if part == "skin" else rest, atol=1e-3)
+        np.testing.assert_allclose(mesh.vertices, reference.parts[part].vertices, atol=1e-3)
         np.testing.assert_array_equal(mesh.triangles, reference.parts[part].triangles)
+    seen = read_ply(tmp_path / "skin.ply")
+    hidden = behind_lids(reference)
+    off = cKDTree(seen.vertices).query(on_surface)[0]
+    assert off[~hidden].max() < 1e-3 < off[hidden].min() and 50 < hidden.sum() < 200
+    assert 3.5 * len(reference.skin.triangles) < len(seen.triangles) < 4 * len(reference.skin.triangles)
+    assert len(np.unique(seen.triangles)) == len(seen.vertices)
     landmarks = read_landmarks(tmp_path / "landmarks.json")
     assert len(landmarks) == 59 and "v" not in landmarks
     bony = json.loads((tmp_path / "skull_landmarks.json").read_text())["landmarks"]

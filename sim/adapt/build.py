@@ -10,7 +10,7 @@ from ..anatomy.landmark_names import SKIN
 from ..detail.maps import SIZE, DetailMaps, detail_maps
 from ..errors import InputError
 from ..mesh import Mesh
-from ..mesh_subdivision import drawn
+from ..mesh_subdivision import drawn, smoother
 from ..progress import Progress, Work, portion
 from .bone import depth_under
 from .closest import Surface
@@ -71,7 +71,7 @@ def build_head(reference: Head, scan: Mesh, landmarks: dict[str, np.ndarray], de
     followed = yield from portion(follow(fit.reference, fit.cage, fit.unseen), 0.7, 0.85)
     yield Progress(0.85, "Checking the anatomy")
     head = followed.head
-    report = fit_report(reference, fit, given, drawn(head.skin.faces, head.skin.vertices))
+    report = fit_report(reference, fit, given, head.skin.vertices)
     report["invented"] = invented(fitted_shares(head, fit.fitted.fitted))
     report["sentence"] = fit_sentence(report, report["invented"])
     anatomy = anatomy_report(head)
@@ -87,21 +87,24 @@ def build_head(reference: Head, scan: Mesh, landmarks: dict[str, np.ndarray], de
     return BuildResult(head, report, anatomy, missing, attributes, maps)
 
 
-def fit_report(reference: Head, fit: SkinFit, given, vertices=None) -> dict:
+def fit_report(reference: Head, fit: SkinFit, given, cage=None) -> dict:
     """Distances from the skin to the scan in the face, mm, where there is data; see `BuildResult`.
 
-    ``vertices`` (n, 3) mm of the skin as drawn, if other than those of ``fit``.
+    They are those of the surface as drawn of ``cage`` (n, 3) mm, which is that of ``fit`` if none is given.
     """
     skin = reference.skin
+    n = len(skin.vertices)
+    rows, quads = smoother(skin.faces, n)
     face = (group(reference, "face") > 0.5) & (group(reference, "inner") <= 0.5)
-    triangles = skin.triangles[face[skin.triangles].all(axis=1)]
-    vertices = fit.fitted.vertices if vertices is None else vertices
-    corners = vertices[triangles]
-    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    inside = np.where(skin.faces >= 0, face[skin.faces], True).all(axis=1)
+    quads = quads[inside[quads.max(axis=1) - (rows.shape[0] - len(skin.faces))]]
+    vertices = rows @ (fit.cage if cage is None else cage)
+    corners = vertices[quads]
+    area = np.linalg.norm(np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]), axis=1)
     found = fit.target.closest(corners.mean(axis=1), 10.0)
     data = found.found & ~found.border
     distance, weight = found.distance[data], area[data]
-    marks = reference.landmarks.on({"skin": vertices})
+    marks = reference.landmarks.on({"skin": vertices[:n]})
     off = [float(np.linalg.norm(marks[n] - p)) for n, p in given.items() if n in marks]
     if len(distance) == 0:
         distance, weight = np.array([np.inf]), np.ones(1)

@@ -14,6 +14,7 @@ from scipy.sparse import csr_matrix, diags, vstack
 
 from ..mesh import edges, vertex_normals
 from .closest import Surface
+from .drawn_points import drawn_points
 from .smooth_system import laplacian, solve_displacement
 
 #: One round each: stiffness of bending, reach in mm, width in mm of what counts as an outlier.
@@ -31,6 +32,7 @@ ALONG = 0.02  # weight of a pull along the surface against one across it
 AGREE = 0.6  # cosine between the normals of skin and scan
 WHOLE = 150.0  # mm²: a piece of data smaller than this is trusted in proportion
 FINEST = 4.0  # most by which fine parts of the mesh are stiffened
+FINE = 0.2  # stiffness below which data in between the cage's vertices is looked for too
 STRETCH = 0.002  # weight of first differences, which keeps the mesh from sliding where bending is free
 
 
@@ -38,7 +40,7 @@ STRETCH = 0.002  # weight of first differences, which keeps the mesh from slidin
 class Anchors:
     """Landmarks on the skin and where they belong.
 
-    sampling (k, n) sparse rows that give the landmark (or the offset between two points) from the vertices; target
+    sampling (k, n) sparse rows that give the landmark (or the offset between two points) from the drawn vertices; target
     (k, 3) mm; weight (k,), 1 for a point of data.
     """
 
@@ -49,9 +51,10 @@ class Anchors:
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """vertices (n, 3) mm; fitted (n,) 0..1, how far data decided the place; distance (n,) mm to the scan, signed
-    (positive outside) and NaN where there is none."""
+    """cage (n, 3) mm; vertices (n, 3) mm, of the surface drawn of it; fitted (n,) 0..1, how far data decided the
+    place; distance (n,) mm to the scan, signed (positive outside) and NaN where there is none."""
 
+    cage: np.ndarray
     vertices: np.ndarray
     fitted: np.ndarray
     distance: np.ndarray
@@ -69,63 +72,65 @@ def matches(points, normals, target: Surface, reach: float):
     return found, trust
 
 
-def fine_fit(vertices, faces, triangles, free, target: Surface, anchors: Anchors, stiffness=None, rounds=SCHEDULE):
+def fine_fit(cage, faces, free, target: Surface, anchors: Anchors, stiffness=None, rounds=SCHEDULE):
     """A generator: yields the fraction done, returns `Fitted`.
 
     Parameters
     ----------
-    vertices (n, 3) mm : the warped skin
-    faces (m, 4) : its quads; triangles (t, 3) : the same as triangles
+    cage (n, 3) mm : the cage of the warped skin
+    faces (m, 4) : its quads
     free (n,) bool : vertices that look for data; the others (mouth bag, lid backs, nostrils) follow smoothly
     stiffness (n,) : factor on the bending stiffness of each vertex (1 everywhere by default)
     """
-    base = np.array(vertices, dtype=float)
+    base = np.array(cage, dtype=float)
     n = len(base)
     stiffness = np.ones(n) if stiffness is None else np.array(stiffness, dtype=float)
     bend = laplacian(base, faces)
     stiffness = stiffness * fineness(base, faces)
-    look = sample_rows(faces, free, n)
+    surface = drawn_points(faces, free)
+    held = (anchors.sampling @ surface.rows[:n]).tocsr()
+    start = surface.rows @ base
     displacement = np.zeros((n, 3))
-    outer = triangles[free[triangles].all(axis=1)]
-    trust = np.zeros(look.shape[0])
     for turn, (soft, reach, width) in enumerate(rounds):
-        now = base + displacement
-        normal = vertex_normals(now, outer)
-        points = look @ now
-        across = look @ normal
-        across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-12)
-        found, trust = matches(points, across, target, reach)
+        now = surface.rows @ (base + displacement)
+        normal = vertex_normals(now, surface.outer)
+        look = np.flatnonzero(surface.look if soft < FINE else surface.coarse)
+        found, trust = matches(now[look], normal[look], target, reach)
         use = np.flatnonzero(trust > 0)
-        gap = found.points[use] - points[use]
+        gap = found.points[use] - now[look[use]]
         # The direction of the data's normal decides; a pinch of the skin's own keeps it calm on rough data.
-        facing = found.normals[use] + 0.5 * across[use]
+        facing = found.normals[use] + 0.5 * normal[look[use]]
         facing /= np.linalg.norm(facing, axis=1, keepdims=True)
         height = np.einsum("ij,ij->i", gap, facing)
         robust = trust[use] / (1 + (height / width) ** 2) ** 2
         blocks = robust[:, None, None] * (facing[:, :, None] * facing[:, None, :] + ALONG * np.eye(3))
-        goal = look[use] @ displacement + gap
+        rows = surface.rows[look[use]]
+        goal = rows @ displacement + gap
         hold = anchors.weight[:, None, None] * np.eye(3)
-        want = anchors.target - anchors.sampling @ base
-        sampling = vstack([look[use], anchors.sampling]).tocsr()
+        want = anchors.target - held @ base
+        sampling = vstack([rows, held]).tocsr()
         blocks = np.concatenate([blocks, hold])
         goal = np.concatenate([goal, want])
         pulls = np.einsum("kij,kj->ki", blocks, goal)
         smooth = (bend.T @ diags(soft * stiffness) @ bend + STRETCH * stretch(bend, stiffness)).tocsr()
         displacement = solve_displacement(smooth, sampling, blocks, pulls, displacement)
-        worse = folded(base, base + displacement, triangles)
+        worse = folded(start, surface.rows @ (base + displacement), surface.triangles)
         if worse.any():  # hold the surroundings of a fold more stiffly from now on
-            near = np.zeros(n)
-            near[triangles[worse].ravel()] = 1
+            at = np.zeros(len(start))
+            at[surface.triangles[worse].ravel()] = 1
+            near = (surface.rows.T @ at > 0.2).astype(float)
             for _ in range(2):
                 near = np.maximum(near, (np.abs(bend) @ near > 0) * 0.9)
             stiffness = stiffness * np.where(near > 0, 6.0, 1.0)
         yield (turn + 1) / len(rounds)
-    vertices = base + displacement
-    normal = vertex_normals(vertices, outer)
+    cage = base + displacement
+    now = surface.rows @ cage
+    vertices = now[:n]
+    normal = vertex_normals(now, surface.outer)[:n]
     found, trust = matches(vertices, normal, target, 3.0)
     trust[~free] = 0
     gap = np.einsum("ij,ij->i", vertices - found.points, found.normals)
-    return Fitted(vertices, np.clip(trust, 0, 1), np.where(free & (trust > 0), gap, np.nan))
+    return Fitted(cage, vertices, np.clip(trust, 0, 1), np.where(free & (trust > 0), gap, np.nan))
 
 
 def fineness(vertices, faces) -> np.ndarray:
@@ -148,17 +153,6 @@ def stretch(bend, stiffness):
     link = link.maximum(link.T)
     total = np.asarray(link.sum(axis=1)).ravel()
     return diags(total) - link
-
-
-def sample_rows(faces, free, n) -> csr_matrix:
-    """Sparse rows (s, n): the free vertices themselves and the middles of the diagonals their quads are split along."""
-    quad = faces[(faces[:, 3] >= 0)] if faces.shape[1] == 4 else faces[:0]
-    quad = quad[free[quad].all(axis=1)] if len(quad) else quad
-    own = np.flatnonzero(free)
-    rows = np.concatenate([np.arange(len(own)), np.repeat(len(own) + np.arange(len(quad)), 2)])
-    columns = np.concatenate([own, quad[:, [0, 2]].ravel()])
-    values = np.concatenate([np.ones(len(own)), np.full(2 * len(quad), 0.5)])
-    return csr_matrix((values, (rows, columns)), shape=(len(own) + len(quad), n))
 
 
 def folded(before, after, triangles, limit: float = 0.0):

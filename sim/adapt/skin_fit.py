@@ -128,17 +128,15 @@ def fit_skin(reference: Head, target: Surface, given: dict[str, np.ndarray]) -> 
         np.concatenate([goal, margin_goal, together.target]),
         np.concatenate([weight, np.full(len(margin), HOLD), together.weight]),
     )
-    work = fine_fit(moved, skin.faces, triangles, free, target, anchors, stiffness)
+    start = undrawn(skin.faces, moved + (whole.skin.vertices - skin.vertices) @ matrix.T, moved)
+    work = fine_fit(start, skin.faces, free, target, anchors, stiffness)
     fitted = None
     while fitted is None:
         try:
             yield Progress(0.4 + 0.6 * next(work), "Reach the scan")
         except StopIteration as stop:
             fitted = stop.value
-    matrix, _ = similarity(skin.vertices, fitted.vertices)
-    start = fitted.vertices + (whole.skin.vertices - skin.vertices) @ matrix.T
-    cage = undrawn(skin.faces, start, fitted.vertices)
-    return SkinFit(whole, fitted, cage, landmarks, outer, target, closed, unseen)
+    return SkinFit(whole, fitted, fitted.cage, landmarks, outer, target, closed, unseen)
 
 
 def as_scanned(reference: Head, given) -> tuple[Head, tuple[str, ...]]:

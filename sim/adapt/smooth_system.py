@@ -2,7 +2,7 @@
 """The regulariser of the last stage: how a displacement over a mesh is kept smooth, and the linear system it makes."""
 
 import numpy as np
-from scipy.sparse import bsr_matrix, coo_matrix, csr_matrix, diags, identity, kron
+from scipy.sparse import bsr_matrix, coo_matrix, csr_matrix, diags, identity
 from scipy.sparse.linalg import splu
 
 from ..mesh import edges
@@ -44,18 +44,21 @@ def solve_displacement(smooth, sampling, blocks, pulls, start):
     count = len(blocks)
     if count:
         middle = bsr_matrix((blocks, np.arange(count), np.arange(count + 1)), shape=(3 * count, 3 * count))
-        wide = kron(sampling, identity(3), format="csr")
-        data = (wide.T @ (middle @ wide)).tocsr()
+        across = sampling.T.tocsr()
         right = (sampling.T @ pulls).ravel()
         # Between the pull along normals (full) and along the surface (weak): their geometric mean preconditions both.
         trace = np.einsum("kii->k", blocks) / 3
         rough = smooth + sampling.T @ diags(trace) @ sampling
     else:
-        data, right, rough = csr_matrix((3 * n, 3 * n)), np.zeros(3 * n), smooth
+        right, rough = np.zeros(3 * n), smooth
     precondition = factorised(rough + 1e-9 * identity(n))
 
     def apply(x):
-        return (smooth @ x.reshape(n, 3)).ravel() + data @ x
+        x = x.reshape(n, 3)
+        out = smooth @ x
+        if count:
+            out += across @ (middle @ (sampling @ x).ravel()).reshape(-1, 3)
+        return out.ravel()
 
     x = start.ravel().copy()
     r = right - apply(x)
