@@ -12,7 +12,7 @@ from .outputs import Outputs
 from .progress_bar import progress_bar
 
 #: File extensions each command writes.
-_BLEND, _PICTURES, _ENGINES = (".blend",), (".png", ".mp4"), (".glb", ".fbx", ".usdc")
+_BLEND, _PICTURES, _ENGINES, _LANDMARKS = (".blend",), (".png", ".mp4"), (".glb", ".fbx", ".usdc"), (".json",)
 
 
 def version() -> None:
@@ -24,24 +24,24 @@ def version() -> None:
 
 
 def build(options) -> None:
-    """Scan and landmarks to a head in a .blend, with plain files if asked for."""
+    """A scan, and landmarks if there are, to a head in a .blend, with plain files if asked for."""
     from ..sim.adapt.landmarks import read_landmarks
 
     _require_file(options.scan, "scan")
     _require_kind(options.output, _BLEND)
-    if options.landmarks is None:
-        raise InputError(_NO_AUTOMATIC)
-    landmarks = read_landmarks(options.landmarks)
+    landmarks = None if options.landmarks is None else read_landmarks(options.landmarks)
     with Outputs() as outputs:
         blend = outputs.file(options.output)
         plain = _plain_folder(outputs, options)
         _start_blender()
         from . import pipeline
 
-        scan = pipeline.load_scan(options.scan, landmarks, options.units, options.up)
-        landmarks = scan.orientation.turn(landmarks)
         name = options.name or Path(options.scan).stem
-        skin, report = _run(pipeline.build(scan, landmarks, name), options)
+        if landmarks is None:
+            skin, report = _run(pipeline.build_alone(options.scan, name, options.units, options.up), options)
+        else:
+            scan = pipeline.load_scan(options.scan, landmarks, options.units, options.up)
+            skin, report = _run(pipeline.build(scan, scan.orientation.turn(landmarks), name), options)
         _set_stage(skin)
         _save(blend)
         _write_plain(skin, plain, outputs)
@@ -51,15 +51,21 @@ def build(options) -> None:
 
 
 def landmarks(options) -> None:
-    """Automatic landmarks: not yet."""
+    """Automatic landmarks to a file, in mm along the scan file's own axes."""
+    from ..sim.adapt.landmarks import write_landmarks
+
     _require_file(options.scan, "scan")
-    raise InputError(_NO_AUTOMATIC)
+    _require_kind(options.output, _LANDMARKS)
+    with Outputs() as outputs:
+        file = outputs.file(options.output)
+        _start_blender()
+        from . import pipeline
 
-
-_NO_AUTOMATIC = (
-    "Landmarks are not found automatically in this version: give a file of four or more to headshop build --landmarks, "
-    "or click them on the scan in Blender."
-)
+        scan, found = _run(pipeline.load_scan_alone(options.scan, options.units, options.up), options)
+        back = {name: position @ scan.orientation.rotation for name, position in found.positions.items()}
+        write_landmarks(file, back, found.missing, found.confidence, found.mid_air)
+    if not options.quiet:
+        print(f"{options.output}: {found.summary()}")
 
 
 def bake(options) -> None:

@@ -8,10 +8,11 @@ import numpy as np
 
 from ..sim.adapt.build import build_head
 from ..sim.anatomy.storage import load_head
+from ..sim.landmarks.find import FoundLandmarks, find_landmarks
 from ..sim.mesh import Mesh
 from ..sim.progress import Progress, Work, portion
 from ..sim.scan.clean import clean_scan
-from ..sim.scan.orientation import Orientation, detect
+from ..sim.scan.orientation import Orientation, detect, plausible_units
 from . import bridge, heads
 from .materials import dress_head
 from .provenance import timed, versions
@@ -52,7 +53,10 @@ def load_scan(path, landmarks: dict | None = None, unit: str | None = None, up: 
 def prepare_scan(raw: Mesh, landmarks=None, unit=None, up=None, seconds=None) -> Scan:
     """Clean a mesh in any unit and axes and bring it to mm, Z up, face toward -Y; see `load_scan`."""
     mesh, counts = clean_scan(raw)
-    found = detect(mesh, landmarks, unit=unit, up=up)
+    return _upright(mesh, counts, detect(mesh, landmarks, unit=unit, up=up), seconds)
+
+
+def _upright(mesh, counts, found, seconds):
     report = counts | {
         "unit": found.unit,
         "unit_scale": found.unit_scale,
@@ -62,6 +66,29 @@ def prepare_scan(raw: Mesh, landmarks=None, unit=None, up=None, seconds=None) ->
         "orientation": found.reason,
     }
     return Scan(mesh.moved(found.apply(mesh.vertices)), found, report, {} if seconds is None else seconds)
+
+
+def load_scan_alone(path, unit: str | None = None, up: str | None = None) -> Work:
+    """`load_scan` where nobody gives landmarks: Work returning (scan, found landmarks), both in the scan's upright place.
+
+    The landmarks are found in the scan as it is, in any turn and unit, and tell its axes.
+
+    Raises
+    ------
+    InputError : the file cannot be read, is no head, or shows no face.
+    """
+    seconds: dict[str, float] = {}
+    yield Progress(0.0, "Reading the scan")
+    with timed(seconds, "read"):
+        raw = read_scan(path)
+    with timed(seconds, "clean"):
+        mesh, counts = clean_scan(raw)
+    with timed(seconds, "landmarks"):
+        scales = plausible_units(mesh, unit)
+        found = yield from portion(find_landmarks(mesh, unit_scales=list(scales.values())), 0.05, 1.0)
+        name = next(name for name, scale in scales.items() if scale == found.unit_scale)
+        axes = detect(mesh, found.positions, unit=found.unit_scale if name == "custom" else name, up=up)
+    return _upright(mesh, counts, axes, seconds), found.placed(axes.turn(found.positions))
 
 
 def add_scan(scan: Scan, name: str, scene: bpy.types.Scene | None = None) -> bpy.types.Object:
@@ -114,4 +141,16 @@ def build(
         skin = next(obj for obj in collection.objects if heads.is_skin(obj))
         dress_head(skin)
     heads.write_report(skin, report)
+    return skin, report
+
+
+def build_alone(path, name: str, unit: str | None = None, up: str | None = None) -> Work:
+    """A scan file to a head without anybody's landmarks; returns what `build` does.
+
+    Raises
+    ------
+    InputError : the file cannot be read, is no head, or shows no face.
+    """
+    scan, found = yield from portion(load_scan_alone(path, unit, up), 0.0, 0.35)
+    skin, report = yield from portion(build(scan, found.sure(), name), 0.35, 1.0)
     return skin, report

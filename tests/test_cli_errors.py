@@ -8,7 +8,9 @@ import subprocess
 import sys
 import time
 
+import numpy as np
 import pytest
+from scipy.spatial import ConvexHull
 
 from headshop.headshop_addon.command_line import main
 from headshop.sim.anatomy.head import Head
@@ -86,9 +88,14 @@ def test_no_landmark_file_there(capfd, tmp_path, scan):
     assert "nowhere.json" in fails(capfd, tmp_path, *build(scan, tmp_path / "nowhere.json", tmp_path))
 
 
-def test_landmarks_are_asked_for(capfd, tmp_path, scan):
-    assert "--landmarks" in fails(capfd, tmp_path, "build", scan, "-o", tmp_path / "head.blend")
-    assert "--landmarks" in fails(capfd, tmp_path, "landmarks", scan, "-o", tmp_path / "found.json")
+def test_a_scan_without_a_face(bpy, capfd, tmp_path):
+    path = tmp_path / "ball.ply"
+    rng = np.random.default_rng(0)
+    points = rng.standard_normal((900, 3))
+    points *= 110 / np.linalg.norm(points, axis=1, keepdims=True)
+    write_ply(path, Mesh.from_triangles(points, ConvexHull(points).simplices))
+    for command, output in (("build", "head.blend"), ("landmarks", "found.json")):
+        assert "No face" in fails(capfd, tmp_path, command, path, "-o", tmp_path / output)
 
 
 @pytest.mark.parametrize(

@@ -135,8 +135,11 @@ def require_usable(positions: dict[str, np.ndarray], source: str = "The landmark
         )
 
 
-def write_landmarks(path, positions: dict[str, np.ndarray], missing=()) -> None:
-    """Write a landmark file: positions in mm (skin or skull landmarks), and the names that were ``missing``."""
+def write_landmarks(path, positions: dict[str, np.ndarray], missing=(), confidence=None, mid_air=()) -> None:
+    """Write a landmark file: positions in mm (skin or skull landmarks), and the names that were ``missing``.
+
+    confidence : name -> 0..1 and ``mid_air`` names, of landmarks found automatically
+    """
     order = {name: k for k, name in enumerate((*SKIN, *(n for n in landmark_names.SKULL if n not in SKIN)))}
     names = sorted(positions, key=order.__getitem__)
     document = {
@@ -145,4 +148,7 @@ def write_landmarks(path, positions: dict[str, np.ndarray], missing=()) -> None:
         "landmarks": {n: [round(float(x), 4) for x in positions[n]] for n in names},
         "missing": sorted(missing, key=order.__getitem__),
     }
+    if confidence is not None:
+        document["mid_air"] = sorted(mid_air, key=order.__getitem__)
+        document["confidence"] = {n: round(float(confidence[n]), 3) for n in names}
     write_atomically(path, (json.dumps(document, indent=1) + "\n").encode())

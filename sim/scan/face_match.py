@@ -60,16 +60,16 @@ def best_turns(points: np.ndarray, template: np.ndarray, turns: list[np.ndarray]
     fine = cKDTree(thinned(points, FINE))
     points = thinned(points, COARSE)
     tree = cKDTree(points)
-    few = template[_order(template, FEW)]
-    start_turn, start_shift, of = _starts(points, template, few, turns)
-    placed = _align(tree, few, start_turn, start_shift, rounds=10)
+    few = template[in_order(template, FEW)]
+    start_turn, start_shift, of = starts_of(points, template, few, turns)
+    placed = align(tree, few, start_turn, start_shift, rounds=10)
     best = np.argsort(placed[-1])
     chosen = {}
     for k in best:  # the two best of each turn go on
         chosen.setdefault(of[k], []).append(k)
     go_on = np.array([k for group in chosen.values() for k in group[:2]])
     go_on = go_on[np.argsort(placed[-1][go_on])][:8]
-    scale, turn, shift, misfit = _align(fine, template, placed[1][go_on], placed[2][go_on], 12, placed[0][go_on])
+    scale, turn, shift, misfit = align(fine, template, placed[1][go_on], placed[2][go_on], 12, placed[0][go_on])
     out = {}
     for k in np.argsort(misfit):
         # where it ended up may be nearer to another of the turns than to the one it began with
@@ -78,7 +78,7 @@ def best_turns(points: np.ndarray, template: np.ndarray, turns: list[np.ndarray]
     return sorted(out.values(), key=lambda pair: pair[0])
 
 
-def _starts(points, template, few, turns):
+def starts_of(points, template, few, turns):
     """For each turn: nose tip on the foremost point; middles and fronts of the boxes together; tops and fronts."""
     rotation, shift, of = [], [], []
     crowd = cKDTree(points)
@@ -102,7 +102,7 @@ def _starts(points, template, few, turns):
     return np.array(rotation), np.array(shift), of
 
 
-def _align(tree, template, turn, shift, rounds, scale=None):
+def align(tree, template, turn, shift, rounds, scale=None):
     """Trimmed ICP of the template to the scan from h starts at once: scale (h,), turn (h, 3, 3), shift, misfit (h,)."""
     scale = np.ones(len(turn)) if scale is None else scale
     keep = int(TRIM * len(template))
@@ -128,7 +128,7 @@ def _align(tree, template, turn, shift, rounds, scale=None):
     return scale, turn, shift, misfit
 
 
-def _order(points, count):
+def in_order(points, count):
     return np.unique(np.linspace(0, len(points) - 1, min(count, len(points))).astype(int))
 
 

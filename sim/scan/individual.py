@@ -60,6 +60,21 @@ def draw_field(landmarks: dict[str, np.ndarray], rng: np.random.Generator, stren
     return Field(points, np.einsum("a,apk->pk", weights, functionals), patches, uneven)
 
 
+def variation(landmarks: dict[str, np.ndarray], points: np.ndarray) -> np.ndarray:
+    """(n, 3, m) mm: how ``points`` (n, 3) of the reference move for one standard deviation of each of the m independent
+    draws of `draw_field`: one per measurement, the person's size, and the sex. Patches of asymmetry are left out."""
+    sources, functionals, deviations, sexes, of = _functionals(landmarks)
+    kernel = _kernel(sources, sources)
+    gram = sum(functionals[:, :, k] @ kernel @ functionals[:, :, k].T for k in range(3))
+    draws = np.zeros((len(of), of.max() + 3))
+    draws[np.arange(len(of)), of] = np.sqrt(1 - SIZE_SHARE) * deviations
+    draws[:, -2] = np.sqrt(SIZE_SHARE) * deviations
+    draws[:, -1] = 0.5 * sexes
+    weights = np.linalg.solve(gram + SLACK**2 * np.diag(np.diag(gram)), draws)
+    strength = np.einsum("am,apk->pkm", weights, functionals)
+    return np.tensordot(_kernel(np.asarray(points, dtype=float), sources), strength, axes=1)
+
+
 def individual(reference: Head, rng: np.random.Generator, strength: float = 1.0) -> Head:
     """A person: the skin of ``reference`` displaced by one random field, and all that lies under it following."""
     field = draw_field(reference.landmark_positions(), rng, strength)

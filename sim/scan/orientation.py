@@ -116,6 +116,16 @@ def detect(
     return Orientation(name, scale, up, front, rotation, certain, reason[0].upper() + reason[1:] + ".")
 
 
+def plausible_units(mesh: Mesh, unit: str | float | None = None) -> dict[str, float]:
+    """Unit -> mm, of those in which the scan is as large as a head; only ``unit`` where it is given.
+
+    Raises
+    ------
+    InputError : there is none, or ``unit`` is not understood.
+    """
+    return dict(_units(surface_samples(mesh), unit))
+
+
 def rotations() -> list[np.ndarray]:
     """The 24 proper rotations that permute and flip axes, the identity first, then Y up with the face toward +Z."""
     out = []

@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How sure a found landmark is, and which hang in mid-air where the scan shows nothing."""
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..adapt.closest import Surface
+from ..adapt.completion import sigma
+from .shape_fit import ShapeFit
+from .shape_space import ShapeSpace
+
+AROUND = 9.0  # mm: skin about a landmark that must have data
+MID_AIR = 3.0  # mm: a landmark farther from the scan hangs in mid-air
+LOST = 11.0  # mm: a landmark less certain than that is missing
+UNSURE = 8.0  # mm of doubt that halve the confidence
+UNSEEN = ("tr",)  # no shape tells where hair begins
+
+
+def doubt(space: ShapeSpace, fit: ShapeFit) -> dict[str, float]:
+    """Name -> mm, one standard deviation of each landmark given the data: of the shape and of the landmark's definition."""
+    modes = np.einsum("kijm,ki->kjm", space.modes[space.corners], space.weights)
+    root = modes @ fit.spread
+    shape = fit.pose.scale * np.sqrt((root**2).sum(axis=(1, 2)) / 3)
+    return {n: float(np.hypot(shape[k], 0.5 * sigma(n) if n not in UNSEEN else 8.0)) for k, n in enumerate(space.names)}
+
+
+def support(space: ShapeSpace, fit: ShapeFit) -> dict[str, float]:
+    """Name -> 0..1, share of the skin around each landmark that lies on the scan."""
+    on = fit.trust * (np.abs(np.nan_to_num(fit.distance, nan=9.0)) < 2.5)
+    tree = cKDTree(fit.points)
+    places = space.landmarks(fit.points)
+    near = tree.query_ball_point(np.array(list(places.values())), AROUND * fit.pose.scale)
+    area = space.area
+    return {
+        name: float((area[i] * on[i]).sum() / area[i].sum()) if len(i) else 0.0
+        for name, i in zip(places, near, strict=True)
+    }
+
+
+def judge(space: ShapeSpace, fit: ShapeFit, target: Surface, positions):
+    """Confidence {name: 0..1}, names in mid-air, names that are missing."""
+    doubts, supports = doubt(space, fit), support(space, fit)
+    names = list(positions)
+    off = target.closest(np.array([positions[n] for n in names])).distance
+    confidence = {n: (0.3 + 0.7 * min(1.0, 1.6 * supports[n])) / (1 + (doubts[n] / UNSURE) ** 2) for n in names}
+    missing = tuple(n for n in names if doubts[n] > LOST and supports[n] < 0.1)
+    mid_air = tuple(n for k, n in enumerate(names) if off[k] > MID_AIR and n not in missing)
+    for n in mid_air:
+        confidence[n] *= 0.4
+    return confidence, mid_air, missing

@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""All 60 landmarks of a scan, found without help: the face, its turn and size, then each by the feature it names."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..adapt.build import NORMALS
+from ..adapt.closest import Surface
+from ..anatomy.head import Head
+from ..anatomy.storage import load_head
+from ..errors import InputError
+from ..mesh import Mesh, vertex_normals
+from ..progress import Progress, Work
+from ..scan.face_match import face_template, surface_samples
+from .confidence import judge
+from .pose_search import search_poses
+from .shape_fit import TRIAL, NoFaceError, fit_shape
+from .shape_space import shape_space
+
+NO_FACE = (
+    "No face is found in the scan: check that it shows one, or give landmarks with --landmarks or by clicking them."
+)
+SURE = 0.25  # confidence from which a landmark helps to build a head
+TRIED = 4  # placements that are looked at closely
+TRIAL_MODES = 40
+POOR = 2.6  # mm on a head of the reference's size: a mean distance in the face above which there is none
+
+
+@dataclass(frozen=True, eq=False)
+class FoundLandmarks:
+    """What `find_landmarks` returns.
+
+    positions : name -> (3,) mm in the mesh's own place, all 60 but the ``missing``
+    confidence : name -> 0..1
+    mid_air : names of those that lie where the scan has a hole; missing : names of those nothing says where they are
+    unit_scale : mm per unit of the mesh; misfit : mean distance of a face to the scan, mm
+    """
+
+    positions: dict[str, np.ndarray]
+    confidence: dict[str, float]
+    mid_air: tuple[str, ...]
+    missing: tuple[str, ...]
+    unit_scale: float = 1.0
+    misfit: float = 0.0
+
+    def placed(self, positions: dict[str, np.ndarray]) -> "FoundLandmarks":
+        """The same landmarks with other ``positions``."""
+        return replace(self, positions=positions)
+
+    def sure(self) -> dict[str, np.ndarray]:
+        """Those to build a head from: name -> (3,) mm of all that the scan shows clearly enough."""
+        return {n: p for n, p in self.positions.items() if n not in self.mid_air and self.confidence[n] >= SURE}
+
+    def summary(self) -> str:
+        """A few words for the user."""
+        words = f"{len(self.positions) - len(self.mid_air)} landmarks found"
+        words += f", {len(self.mid_air)} in mid-air over holes" if self.mid_air else ""
+        return words + (f", {len(self.missing)} missing" if self.missing else "")
+
+
+def find_landmarks(mesh: Mesh, reference: Head | None = None, unit_scales=(1.0,)) -> Work:
+    """Work returning the `FoundLandmarks` of a cleaned scan, turned any way.
+
+    unit_scales : mm per unit of the mesh, the likeliest of which is found as well
+
+    Raises
+    ------
+    InputError : there is no face in it.
+    """
+    looking = "Looking for the face"
+    yield Progress(0.0, looking)
+    reference = reference or load_head()
+    space = shape_space(reference)
+    few = space.reduced(TRIAL_MODES)
+    template, samples = face_template(reference), surface_samples(mesh)
+    trials = []
+    for k, scale in enumerate(unit_scales):
+        done = k / len(unit_scales)
+        yield Progress(0.1 + 0.4 * done, looking)
+        poses = search_poses(samples * scale, template, TRIED)
+        yield Progress(0.1 + 0.4 * (done + 0.5 / len(unit_scales)), looking)
+        target = Surface(mesh.vertices * scale, mesh.triangles, smooth=NORMALS)
+        for pose in poses:
+            facing = _facing(few, target, pose)
+            try:
+                fit = yield from _run(fit_shape(few, facing, pose, TRIAL), 0.1 + 0.4 * done + 0.3, 0.0, looking)
+            except NoFaceError:
+                continue
+            trials.append((_misfit(few, fit), scale, fit, facing))
+    if not trials:
+        raise InputError(NO_FACE)
+    _, scale, fit, target = min(trials, key=lambda t: t[0])
+    fit = yield from _run(fit_shape(space, target, fit.pose, coefficients=fit.coefficients), 0.5, 0.9, "Fitting a face")
+    misfit = _misfit(space, fit)
+    if misfit > POOR:
+        raise InputError(NO_FACE)
+    positions = space.landmarks(fit.points)
+    confidence, mid_air, missing = judge(space, fit, target, positions)
+    positions = {n: p for n, p in positions.items() if n not in missing}
+    confidence = {n: confidence[n] for n in positions}
+    return FoundLandmarks(positions, confidence, mid_air, missing, scale, misfit)
+
+
+def _facing(space, target, pose):
+    """The scan turned inside out if its normals face away from those of a skin at ``pose``."""
+    points = pose.scale * space.points @ pose.turn.T + pose.shift
+    face = space.face > 0.5
+    found = target.closest(points[face], 15.0)
+    agree = np.einsum("ij,ij->i", found.normals, vertex_normals(points, space.triangles)[face])[found.found]
+    return target.turned() if len(agree) and np.median(agree) < 0 else target
+
+
+def _misfit(space, fit):
+    """Mean distance of the face to the scan, mm; what found nothing counts as far."""
+    weight = space.area * (space.face > 0.5)
+    distance = np.where(np.isfinite(fit.distance), np.abs(fit.distance), 6.0)
+    return float(np.average(distance, weights=weight)) / fit.pose.scale
+
+
+def _run(work, start, stop, label):
+    while True:
+        try:
+            done = next(work)
+        except StopIteration as end:
+            return end.value
+        yield Progress(start + max(stop - start, 0.0) * done, label)

@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A plausible head laid on a scan without landmarks: closest points that face the same way, the most likely shape.
+
+Each round pairs the skin with the scan and solves for place and shape together: the coefficients of the shape space
+that are most likely given the data (least squares with the space's own variance as regulariser), where distances along
+the scan's normals count and outliers are given up (Geman and McClure 1987).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..adapt.closest import Surface
+from ..mesh import vertex_normals
+from .pose_search import Pose
+from .shape_space import ShapeSpace
+
+#: One round each: share of the modes' variance allowed, reach in mm, width in mm of an outlier, noise in mm.
+SCHEDULE = (
+    *((0.05, 30.0, 14.0, 6.0),) * 4,
+    *((0.3, 24.0, 10.0, 4.0),) * 4,
+    *((1.0, 18.0, 7.0, 3.0),) * 5,
+    *((1.0, 14.0, 5.0, 2.0),) * 5,
+    *((1.0, 10.0, 3.5, 1.4),) * 5,
+    *((1.0, 8.0, 2.5, 1.0),) * 5,
+)
+#: The first rounds tell a face from what only looks like one.
+TRIAL = SCHEDULE[:9]
+ALONG = 0.1  # weight of a pull along the surface against one across it
+AGREE = 0.45  # cosine between the normals of skin and scan
+LEAST = 60  # points of the skin that must find the scan
+PATCH = 40.0  # mm²: so much of the surface says one thing
+TILT = 0.05  # rad of turn, and fraction of size, that count as much as 1 standard deviation
+
+
+class NoFaceError(Exception):
+    """Too little of the skin finds anything on the scan."""
+
+
+@dataclass(frozen=True, eq=False)
+class ShapeFit:
+    """A skin laid on the scan.
+
+    points (n, 3) mm in the scan's place; coefficients (m,); pose : the similarity from the reference's place;
+    trust (n,) 0..1 : how far data decided; distance (n,) mm to the scan along its normal, NaN where there is none
+    spread (m, r) : a root of the coefficients' covariance given the data, for `doubt`
+    """
+
+    points: np.ndarray
+    coefficients: np.ndarray
+    pose: Pose
+    trust: np.ndarray
+    distance: np.ndarray
+    spread: np.ndarray
+
+    @property
+    def matrix(self) -> np.ndarray:
+        """(3, 3) linear part of the similarity."""
+        return self.pose.scale * self.pose.turn
+
+
+def fit_shape(space: ShapeSpace, target: Surface, pose: Pose, rounds=SCHEDULE, coefficients=None):
+    """A generator: yields the fraction done, returns the `ShapeFit` that begins at ``pose``.
+
+    Raises
+    ------
+    NoFaceError : next to nothing of the scan lies where the face is looked for.
+    """
+    m = space.modes.shape[2]
+    coefficients = np.zeros(m) if coefficients is None else np.r_[coefficients, np.zeros(m - len(coefficients))]
+    scale, turn, shift = pose.scale, pose.turn, pose.shift
+    middle = space.points[space.face > 0.5].mean(axis=0)
+    for done, (variance, reach, width, noise) in enumerate(rounds):
+        shaped = space.shaped(coefficients)
+        points = scale * shaped @ turn.T + shift
+        found, trust, normals = pairs(space, points, target, reach * scale)
+        use = np.flatnonzero(trust > 0)
+        if len(use) < LEAST:
+            raise NoFaceError
+        place = ((found.points[use] - shift) @ turn) / scale
+        across = normals[use] @ turn
+        gap = place - shaped[use]
+        height = np.einsum("ij,ij->i", gap, across)
+        weight = trust[use] * space.area[use] / PATCH / (1 + (height / width) ** 2) ** 2 / noise**2
+        # Unknowns: a small turn about the face, a shift, a change of size, and the coefficients.
+        arm = shaped[use] - middle
+        rigid = np.zeros((len(use), 3, 7))
+        rigid[:, 0, 1], rigid[:, 0, 2] = arm[:, 2], -arm[:, 1]
+        rigid[:, 1, 0], rigid[:, 1, 2] = -arm[:, 2], arm[:, 0]
+        rigid[:, 2, 0], rigid[:, 2, 1] = arm[:, 1], -arm[:, 0]
+        rigid[:, :, 3:6] = np.eye(3)
+        rigid[:, :, 6] = arm
+        rows = np.concatenate([rigid, space.modes[use]], axis=2)
+        right = gap + space.modes[use] @ coefficients
+        one = (across[:, None, :] @ rows)[:, 0]
+        few = slice(None, None, 4)  # the pull along the surface only steadies what the normals leave open
+        flat = rows[few].reshape(-1, 7 + m)
+        wide = np.repeat(4 * ALONG**2 * weight[few], 3)
+        heavy = one * weight[:, None]
+        system = heavy.T @ one + (flat * wide[:, None]).T @ flat
+        pull = heavy.T @ np.einsum("ki,ki->k", across, right) + flat.T @ (wide * right[few].ravel())
+        prior = np.full(7 + m, 1 / variance)
+        prior[[0, 1, 2, 6]] = 1e-3 / TILT**2
+        prior[3:6] = 1e-6
+        system[np.diag_indices_from(system)] += prior
+        step = np.linalg.solve(system, pull)
+        coefficients = step[7:]
+        grow = 1 + np.clip(step[6], -0.1, 0.1)
+        small = _rotation(np.clip(step[:3], -0.3, 0.3))
+        # x -> middle + grow small (x - middle) + move, then the similarity so far
+        shift = shift + scale * turn @ (middle + step[3:6] - grow * small @ middle)
+        turn, scale = turn @ small, scale * grow
+        yield (done + 1) / len(rounds)
+    spread = np.linalg.cholesky(np.linalg.inv(system))[7:]
+    points = scale * space.shaped(coefficients) @ turn.T + shift
+    found, trust, _ = pairs(space, points, target, 4.0 * scale)
+    gap = np.einsum("ij,ij->i", points - found.points, found.normals)
+    distance = np.where(trust > 0, gap, np.nan)
+    return ShapeFit(points, coefficients, Pose(scale, turn, shift, pose.misfit), trust, distance, spread)
+
+
+def pairs(space: ShapeSpace, points, target: Surface, reach):
+    """Where on the scan the skin's ``points`` belong: `Contacts`, trust (n,) 0..1, the scan's normals there (n, 3)."""
+    normals = vertex_normals(points, space.triangles)
+    found = target.ranked(points, normals, reach, AGREE)
+    agree = np.einsum("ij,ij->i", found.normals, normals)
+    trust = np.where(found.found & ~found.border, np.clip((agree - AGREE) / (1 - AGREE) * 1.5, 0.05, 1), 0)
+    return found, trust, found.normals
+
+
+def _rotation(vector):
+    """Rotation (3, 3) by a rotation vector (Rodrigues)."""
+    angle = np.linalg.norm(vector)
+    k = np.array([[0, -vector[2], vector[1]], [vector[2], 0, -vector[0]], [-vector[1], vector[0], 0]])
+    if angle < 1e-12:
+        return np.eye(3) + k
+    return np.eye(3) + np.sin(angle) / angle * k + (1 - np.cos(angle)) / angle**2 * k @ k

@@ -1,0 +1,155 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How heads differ: the reference skin and the displacements that make other plausible people of it.
+
+A Gaussian process over the skin in low rank (Lüthi et al. 2018, Gaussian process morphable models): the variation of
+our own random individuals, which is linear in what they draw (`sim.scan.individual`), smooth displacements on three
+scales for what their measurements do not name, and the two ways in which a scanned face departs from rest most, an
+open jaw and a smile.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.linalg import cholesky, solve_triangular
+
+from ..anatomy.head import Head
+from ..anatomy.landmark_names import SKIN
+from ..mesh_subdivision import drawn
+from ..scan.individual import variation
+
+#: Smooth displacements: reach in mm, standard deviation in mm, whether for the face only.
+SCALES = ((90.0, 6.0, False), (45.0, 2.5, False), (24.0, 1.5, True))
+LEAST = 0.1  # mm: root mean square over the skin of a mode that counts
+JAW_OPEN = 0.12  # rad, one standard deviation
+#: A smile moves the corners of the mouth outward, back and up, mm; one standard deviation.
+SMILE, SMILE_REACH = (4.0, 3.0, 4.0), 20.0
+
+
+@dataclass(frozen=True, eq=False)
+class ShapeSpace:
+    """A skin and its variation.
+
+    points (n, 3) mm : outer skin of the reference, as drawn
+    modes (n, 3, m) mm : displacement for one standard deviation of each coefficient
+    triangles (t, 3) : of the points
+    area (n,) mm² : surface around each point
+    face, ear (n,) 0..1 : membership
+    names (k,) : landmarks; corners (k, 3), weights (k, 3) : where they ride on the points
+    """
+
+    points: np.ndarray
+    modes: np.ndarray
+    triangles: np.ndarray
+    area: np.ndarray
+    face: np.ndarray
+    ear: np.ndarray
+    names: tuple[str, ...]
+    corners: np.ndarray
+    weights: np.ndarray
+
+    def shaped(self, coefficients: np.ndarray) -> np.ndarray:
+        """(n, 3) mm, the skin with ``coefficients`` (m,)."""
+        return self.points + (self.modes.reshape(-1, self.modes.shape[2]) @ coefficients).reshape(-1, 3)
+
+    def reduced(self, count: int) -> "ShapeSpace":
+        """The same skin with its first ``count`` modes only."""
+        return replace(self, modes=self.modes[:, :, :count])
+
+    def landmarks(self, points: np.ndarray) -> dict[str, np.ndarray]:
+        """Name -> (3,), the landmarks on ``points`` (n, 3)."""
+        at = np.einsum("kij,ki->kj", points[self.corners], self.weights)
+        return dict(zip(self.names, at, strict=True))
+
+
+def shape_space(head: Head) -> ShapeSpace:
+    """The shape space of a head at rest."""
+    skin = head.skin
+    whole = drawn(skin.faces, skin.vertices)
+    inner = head.groups["inner"] > 0.5
+    marks = [k for k, part in enumerate(head.landmarks.part) if part == "skin" and head.landmarks.names[k] in SKIN]
+    outside = ~inner
+    outside[head.landmarks.corners[marks].ravel()] = True
+    index = np.cumsum(outside) - 1
+    points = whole[outside]
+    triangles = skin.triangles
+    triangles = index[triangles[(outside & ~inner)[triangles].all(axis=1)]]
+    corners = points[triangles]
+    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 6
+    area = np.bincount(triangles.ravel(), np.repeat(area, 3), len(points))
+
+    def group(name):
+        return np.asarray(head.groups[name], dtype=float)[outside]
+
+    face, ear = group("face"), np.maximum(group("ear_l"), group("ear_r"))
+    landmarks = head.landmark_positions()
+    modes = [variation(landmarks, points)]
+    modes += [_smooth(points, reach, sd, (face > 0.5) | (ear > 0.3) if local else None) for reach, sd, local in SCALES]
+    modes.append(_jaw(points, group("jaw"), head))
+    modes.append(_smile(points, landmarks))
+    modes = _principal(np.concatenate(modes, axis=2), area)
+    return ShapeSpace(
+        points,
+        modes,
+        triangles,
+        area,
+        face,
+        ear,
+        tuple(head.landmarks.names[k] for k in marks),
+        index[head.landmarks.corners[marks]],
+        head.landmarks.weights[marks],
+    )
+
+
+def _principal(modes, area):
+    """The same Gaussian process in its principal directions, without those that move nothing."""
+    flat = (modes * np.sqrt(area / area.sum())[:, None, None]).reshape(-1, modes.shape[2])
+    variance, turn = np.linalg.eigh(flat.T @ flat)
+    turn = turn[:, ::-1][:, np.sqrt(np.maximum(variance[::-1], 0)) > LEAST]
+    return modes @ turn
+
+
+def _smooth(points, reach, sd, where=None):
+    """Modes (n, 3, 3 c) of a Gaussian process of the given reach and deviation, exact at c even places (Nyström)."""
+    places = points if where is None else points[where]
+    centres = places[farthest(places, reach)]
+    root = cholesky(_gauss(centres, centres, reach) + 1e-4 * np.eye(len(centres)), lower=True)
+    shapes = sd * solve_triangular(root, _gauss(centres, points, reach), lower=True).T
+    out = np.zeros((len(points), 3, 3 * len(centres)))
+    for axis in range(3):
+        out[:, axis, axis::3] = shapes
+    return out
+
+
+def farthest(points: np.ndarray, spacing: float) -> np.ndarray:
+    """Indices of points such that none lies farther than ``spacing`` from one of them, each as far as can be."""
+    chosen = [0]
+    distance = np.linalg.norm(points - points[0], axis=1)
+    while distance.max() > spacing:
+        chosen.append(int(distance.argmax()))
+        distance = np.minimum(distance, np.linalg.norm(points - points[chosen[-1]], axis=1))
+    return np.array(chosen)
+
+
+def _gauss(a, b, reach):
+    apart = np.maximum((a * a).sum(axis=1)[:, None] + (b * b).sum(axis=1) - 2 * a @ b.T, 0)
+    return np.exp(-apart / (2 * reach**2))
+
+
+def _jaw(points, jaw, head):
+    """The mode (n, 3, 1) of the jaw's hinge, opening."""
+    axis = head.jaw.condyle_l - head.jaw.condyle_r
+    axis = axis / np.linalg.norm(axis)
+    middle = (head.jaw.condyle_l + head.jaw.condyle_r) / 2
+    turn = np.cross(axis, points - middle)
+    down = np.cross(axis, head.jaw.incisor - middle)[2]
+    return (-np.sign(down) * JAW_OPEN * jaw[:, None] * turn)[:, :, None]
+
+
+def _smile(points, landmarks):
+    """The mode (n, 3, 1) of both corners of the mouth drawn outward, back and up."""
+    out, back, up = SMILE
+    moved = sum(
+        _gauss(points, landmarks[name][None], SMILE_REACH) * np.array([side * out, back, up])
+        for name, side in (("ch_l", 1.0), ("ch_r", -1.0))
+    )
+    return moved[:, :, None]

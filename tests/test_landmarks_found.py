@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Landmarks found without help: in any turn and unit, on whole and on damaged heads, and refused where no face is."""
+
+import numpy as np
+import pytest
+
+from headshop.sim.anatomy.landmark_names import SKIN, mirrored
+from headshop.sim.landmarks.find import find_landmarks
+from headshop.sim.mesh import Mesh
+from headshop.sim.progress import finish
+from headshop.sim.scan.individual import draw_field
+
+EARS_AND_BACK = ("v", "op", "tr", "eu", "t", "sa", "sba", "pra", "pa", "obs", "obi")
+FACE = [n for n in SKIN if n.partition("_")[0] not in EARS_AND_BACK]
+
+
+@pytest.fixture(scope="module")
+def person(reference):
+    """Somebody else than the reference, and the true landmarks (mm)."""
+    field = draw_field(reference.landmark_positions(), np.random.default_rng(3))
+    skin = reference.skin.vertices
+    points = skin + field(skin)
+    return reference.skin.moved(points), reference.landmarks.on({"skin": points} | _others(reference))
+
+
+def _others(reference):
+    return {name: part.vertices for name, part in reference.parts.items() if name != "skin"}
+
+
+def _turned(mesh: Mesh, seed: int):
+    """The mesh turned and shifted at random; the rotation and shift."""
+    rng = np.random.default_rng(seed)
+    turn = np.linalg.qr(rng.standard_normal((3, 3)))[0]
+    turn *= np.sign(np.linalg.det(turn))
+    shift = 300 * rng.standard_normal(3)
+    return mesh.moved(mesh.vertices @ turn.T + shift), turn, shift
+
+
+def test_landmarks_of_a_turned_person_in_metres(person, reference):
+    mesh, truth = person
+    turned, turn, shift = _turned(mesh, 1)
+    found = finish(find_landmarks(turned.moved(turned.vertices / 1000), reference, (1.0, 1000.0)))
+    assert found.unit_scale == 1000.0
+    off = {n: np.linalg.norm(found.positions[n] - (turn @ truth[n] + shift)) for n in SKIN}
+    assert np.mean([off[n] for n in FACE]) < 2.5
+    assert np.mean(list(off.values())) < 4.0
+    for n in FACE:
+        if n.endswith("_l"):
+            other = turn @ truth[mirrored(n)] + shift
+            assert off[n] < np.linalg.norm(found.positions[n] - other)
+    assert not found.missing
+    assert np.mean([found.confidence[n] for n in FACE]) > 0.6
+
+
+def test_what_a_damaged_scan_does_not_show_is_in_mid_air_and_unsure(person, reference):
+    mesh, truth = person
+    turned, turn, shift = _turned(mesh, 2)
+    upright = (turned.vertices - shift) @ turn
+    front = (upright[:, 1] < -20)[turned.triangles].all(axis=1)
+    right_cheek = (np.linalg.norm(upright - truth["ch_r"], axis=1) < 22)[turned.triangles].any(axis=1)
+    rest = Mesh.from_triangles(turned.vertices, turned.triangles[front & ~right_cheek])
+    found = finish(find_landmarks(rest, reference))
+    off = {n: np.linalg.norm(p - (turn @ truth[n] + shift)) for n, p in found.positions.items()}
+    assert np.mean([off[n] for n in FACE if n in off]) < 3.0
+    hidden = {"op", "pa_l", "pa_r", "ch_r"}
+    assert hidden <= set(found.mid_air) | set(found.missing)
+    assert not {"prn", "en_l", "en_r", "ch_l", "sn"} & (set(found.mid_air) | set(found.missing))
+    seen = min(found.confidence[n] for n in ("prn", "en_l", "en_r", "sn"))
+    assert all(found.confidence.get(n, 0.0) < 0.6 * seen for n in hidden)
+    assert "op" not in found.sure() and "prn" in found.sure()
+
+
+def test_inside_out_makes_no_difference(person, reference):
+    mesh, truth = person
+    found = finish(find_landmarks(Mesh.from_triangles(mesh.vertices, mesh.triangles[:, ::-1]), reference))
+    assert np.mean([np.linalg.norm(found.positions[n] - truth[n]) for n in FACE]) < 2.5
