@@ -183,3 +183,32 @@ def resample(
         corner = mesh.colour[triangles[triangle[valid]]]
         colour[valid] = np.einsum("ij,ijk->ik", weights[valid], corner)
     return RangeMap(np.where(valid, radius, np.nan), valid, colour, first, step, top, rise, origin, axes)
+
+
+def reduced(range_map: RangeMap, by: tuple[int, int]) -> RangeMap:
+    """The map with ``by`` = (rows, columns) texels made one, the mean of those valid."""
+    h, w = (n // k for n, k in zip(range_map.shape, by, strict=True))
+
+    def blocks(values):
+        return values[: h * by[0], : w * by[1]].reshape(h, by[0], w, by[1], -1)
+
+    valid = blocks(range_map.valid)
+    share = valid.sum(axis=(1, 3))[..., 0]
+    radius = np.where(valid, blocks(range_map.radius), 0).sum(axis=(1, 3))[..., 0]
+    colour = None
+    if range_map.colour is not None:
+        values = blocks(range_map.colour)
+        known = np.isfinite(values)
+        count = known.sum(axis=(1, 3))
+        colour = np.where(known, values, 0).sum(axis=(1, 3)) / np.where(count, count, np.nan)
+        colour = colour.astype(np.float32)
+    return replace(
+        range_map,
+        radius=np.where(share, radius / np.maximum(share, 1), np.nan),
+        valid=share > 0,
+        colour=colour,
+        first=range_map.first + range_map.step * (by[1] - 1) / 2,
+        step=range_map.step * by[1],
+        top=range_map.top - range_map.rise * (by[0] - 1) / 2,
+        rise=range_map.rise * by[0],
+    )
