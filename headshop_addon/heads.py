@@ -52,6 +52,7 @@ def create_head(
     skin[ANATOMY] = json.dumps(anatomy_document(head), separators=(",", ":"))
     subdivision = skin.modifiers.new("Subdivision", "SUBSURF")
     subdivision.subdivision_type, subdivision.levels, subdivision.render_levels = "CATMULL_CLARK", 1, 2
+    subdivision.uv_smooth = "NONE"  # images are painted for UVs that run straight across each face
     others = [_add_part(collection, head, part, name) for part in PARTS if part in head.parts and part != "skin"]
     others += _add_muscles(collection, head, name)
     for obj in others:

@@ -19,7 +19,7 @@ from ..sim.anatomy.storage import write_atomically
 from ..sim.mesh import Mesh
 from ..sim.mesh_subdivision import drawn
 from ..sim.scan.ply import write_ply
-from . import bridge, heads, shape_keys
+from . import bridge, detail_images, heads, shape_keys
 from .plain_files import muscles_document, write_json
 
 
@@ -46,6 +46,7 @@ def write_plain(skin: bpy.types.Object, folder) -> None:
         stream = io.BytesIO()
         np.savez_compressed(stream, **shapes)
         write_atomically(folder / "shapes.npz", stream.getvalue())
+    detail_images.write_files(skin, folder)
 
 
 def as_drawn(head: Head) -> Head:

@@ -2,7 +2,7 @@
 """The skin's material: scattering, lips, wet insides, brows, pores, and the scan's colour where there is any.
 
 It reads attributes of the mesh (`skin_paint.py` writes them), so one material serves every head in the file; only a
-head with a colour image of its own needs its own.
+head with images of its own needs its own.
 
 Sources: scattering lengths 3.7, 1.4, 0.7 mm from the measured coefficients of Jensen, Marschner, Levoy, Hanrahan 2001
 (skin1); refractive index 1.4; furrows 0.3 to 0.5 mm apart; roughness by region is our estimate.
@@ -10,35 +10,42 @@ Sources: scattering lengths 3.7, 1.4, 0.7 mm from the measured coefficients of J
 
 import bpy
 
+from .detail_nodes import DetailImages, add_displacement, detail_normal, refresh_detail
 from .shader_nodes import Graph, socket
 
 REST, COLOUR, MASK, BROW = "headshop_rest", "headshop_colour", "headshop_mask", "headshop_brow"
+COLOUR_NODE = "Head Shop Colour"
 RADIUS, SCALE_M = (1.0, 0.37, 0.19), 0.0037
 
 
-def skin_material(name: str = "Head Shop Skin", image: bpy.types.Image | None = None) -> bpy.types.Material:
+def skin_material(
+    name: str = "Head Shop Skin", image: bpy.types.Image | None = None, detail: DetailImages | None = None
+) -> bpy.types.Material:
     """The skin material of that name, made if the file has none.
 
-    image : a colour image on the skin's UV map, in place of the per-vertex colour.
+    image : a colour image on the skin's UV map, in place of the per-vertex colour
+    detail : the head's displacement and normal map
     """
     material = bpy.data.materials.get(name)
     if material is None:
         material = bpy.data.materials.new(name)
-        _write(Graph(material), image)
+        _write(Graph(material), image, detail)
         material.diffuse_color = (0.58, 0.38, 0.29, 1.0)
-    elif image is not None:
-        for node in material.node_tree.nodes:
-            if node.type == "TEX_IMAGE":
-                node.image = image
+    else:
+        nodes = material.node_tree.nodes
+        if image is not None and COLOUR_NODE in nodes:
+            nodes[COLOUR_NODE].image = image
+        if detail is not None:
+            refresh_detail(material, detail)
     return material
 
 
-def _write(graph: Graph, image) -> None:
+def _write(graph: Graph, image, detail) -> None:
     rest = graph.attribute(REST)  # mm, so that texture moves with the skin
     if image is None:
         base = graph.attribute(COLOUR, "Color")
     else:
-        base = socket(graph.node("TexImage", image=image, extension="EXTEND").outputs, "Color")
+        base = socket(graph.node("TexImage", image=image, extension="EXTEND", name=COLOUR_NODE).outputs, "Color")
     mask = graph.node("Attribute", attribute_name=MASK)
     lips, wet, shine = graph.separate(socket(mask.outputs, "Vector"))
 
@@ -86,11 +93,13 @@ def _write(graph: Graph, image) -> None:
             "Coat Weight": coat,
             "Coat Roughness": 0.28,
             "Coat IOR": 1.4,
-            "Normal": graph.bump(grain, 0.00035, 0.7),
+            "Normal": graph.bump(grain, 0.00035, 0.7, None if detail is None else detail_normal(graph, detail)),
         },
         subsurface_method="BURLEY",
     )
     graph.surface(shader.outputs[0])
+    if detail is not None:
+        add_displacement(graph, detail)
 
 
 def _paint_brows(graph: Graph, colour):
