@@ -51,6 +51,9 @@ def parser() -> argparse.ArgumentParser:
 
     build = command("build", "Turn a scan into an animatable head.", reading, plain)
     build.add_argument("--landmarks", metavar="FILE", help="landmark file (headshop-landmarks/1)")
+    sizes = (0, 512, 1024, 2048, 4096)
+    about = "pixels along a side of the displacement and normal map, 0 for none (default: 1024)"
+    build.add_argument("--detail", type=int, choices=sizes, default=1024, metavar="SIZE", help=about)
     build.add_argument("--name", help="what to call the head (default: the scan's name)")
     build.add_argument("-o", "--output", required=True, metavar="HEAD.blend")
 

@@ -38,16 +38,16 @@ def build(options) -> None:
 
         name = options.name or Path(options.scan).stem
         if landmarks is None:
-            skin, report = _run(pipeline.build_alone(options.scan, name, options.units, options.up), options)
+            work = pipeline.build_alone(options.scan, name, options.units, options.up, options.detail)
         else:
             scan = pipeline.load_scan(options.scan, landmarks, options.units, options.up)
-            skin, report = _run(pipeline.build(scan, scan.orientation.turn(landmarks), name), options)
+            work = pipeline.build(scan, scan.orientation.turn(landmarks), name, detail=options.detail)
+        skin, report = _run(work, options)
         _set_stage(skin)
         _save(blend)
         _write_plain(skin, plain, outputs)
     if not options.quiet:
-        fit, sizes = report["fit"], report["scan"]
-        print(f"{options.output}: {name}, {sizes['triangles']} triangles, fitted to {fit['mean_mm']:.3f} mm on average")
+        print(f"{options.output}: {report['fit']['sentence']}")
 
 
 def landmarks(options) -> None:

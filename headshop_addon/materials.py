@@ -10,8 +10,10 @@ from scipy.spatial import cKDTree
 
 from ..sim.anatomy.head import MATERIALS, Eye, Head, Muscle
 from ..sim.mesh import Mesh
+from ..sim.progress import Progress, Work, finish, portion
 from . import bridge, heads
 from .anatomy_materials import FIBRE, REST, anatomy_material
+from .detail_images import images_of
 from .eye_materials import EYE, IRIS, IRIS_COLOUR, eye_material
 from .scan_colour import ScanColour, colour_image, iris_colour
 from .skin_material import COLOUR, skin_material
@@ -29,6 +31,12 @@ def dress_head(skin: bpy.types.Object) -> None:
     ------
     InputError : not a whole head.
     """
+    finish(dressing(skin))
+
+
+def dressing(skin: bpy.types.Object) -> Work:
+    """`dress_head` as work with progress."""
+    yield Progress(0.0, "Dressing the head")
     head = heads.read_head(skin)
     axes = head_axes(head)
     scan = _coloured_scan(skin)
@@ -38,8 +46,10 @@ def dress_head(skin: bpy.types.Object) -> None:
         mesh = head.parts[part]
         place = mesh.vertices @ axes.T
         if part == "skin":
+            yield Progress(0.1, "Painting the skin")
             paint_skin(obj, mesh, head.groups, place, {n: axes @ p for n, p in head.landmark_positions().items()})
-            own = None if scan is None else _scan_skin(skin, mesh, scan, head.groups["inner"])
+            own = yield from portion(_own_skin(skin, mesh, scan, head.groups["inner"]), 0.2, 0.85)
+            yield Progress(0.85, "Dressing the head")
         elif part in ("eye_l", "eye_r"):
             write_vectors(obj.data, EYE, eye_coordinates(mesh, head.eyes[part == "eye_r"], axes[2]))
             colour = (*(IRIS_COLOUR if iris is None else iris), 1.0)
@@ -79,15 +89,19 @@ def _coloured_scan(skin: bpy.types.Object) -> Mesh | None:
     return seen.moved(seen.vertices @ matrix[:3, :3].T + matrix[:3, 3] / bridge.METRES)
 
 
-def _scan_skin(skin: bpy.types.Object, mesh: Mesh, scan: Mesh, inner: np.ndarray) -> bpy.types.Material | None:
-    """A skin material of the head's own that shows its scan's colours; None if the scan lies elsewhere."""
-    name = heads.head_name(skin)
-    painted = colour_image(mesh, ScanColour(scan), inner, f"{name} Colour")
-    if painted is None:
+def _own_skin(skin: bpy.types.Object, mesh: Mesh, scan: Mesh | None, inner: np.ndarray) -> Work:
+    """Work returning a skin material of the head's own with its scan's colours and fine detail; None if there is
+    neither."""
+    name, image = heads.head_name(skin), None
+    if scan is not None:
+        painted = yield from colour_image(mesh, ScanColour(scan), inner, f"{name} Colour")
+        if painted is not None:
+            image, colour = painted
+            write_vectors(skin.data, COLOUR, np.column_stack([colour, np.ones(len(colour))]))
+    detail = images_of(skin)
+    if image is None and detail is None:
         return None
-    image, colour = painted
-    write_vectors(skin.data, COLOUR, np.column_stack([colour, np.ones(len(colour))]))
-    return skin_material(f"Head Shop Skin {name}", image)
+    return skin_material(f"Head Shop Skin {name}", image, detail)
 
 
 def _material(kind: str) -> bpy.types.Material:

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """From a scan file and landmarks to a head in the scene: the one path that operators and the command line share."""
 
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 import bpy
@@ -8,15 +9,17 @@ import numpy as np
 
 from ..sim.adapt.build import build_head
 from ..sim.anatomy.storage import load_head
-from ..sim.landmarks.find import FoundLandmarks, find_landmarks
+from ..sim.detail.maps import SIZE
+from ..sim.landmarks.find import find_landmarks
 from ..sim.mesh import Mesh
 from ..sim.progress import Progress, Work, portion
 from ..sim.scan.clean import clean_scan
 from ..sim.scan.orientation import Orientation, detect, plausible_units
 from . import bridge, heads
-from .materials import dress_head
+from .detail_images import write_images
+from .materials import dressing
 from .provenance import timed, versions
-from .scan_import import read_scan
+from .scan_import import datablocks, read_scan
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,11 +109,12 @@ def build(
     name: str,
     scan_object: bpy.types.Object | None = None,
     scene: bpy.types.Scene | None = None,
+    detail: int = SIZE,
 ) -> Work:
     """Fit the reference head to ``scan`` and put it into the scene; returns (skin object, report).
 
-    ``landmarks`` are in the scan's place (mm). Nothing is added to the scene before all is computed, so closing the
-    generator leaves it as it was.
+    ``landmarks`` are in the scan's place (mm); ``detail`` is the side of the detail maps in pixels, 0 for none. Closing
+    the generator leaves the scene as it was.
 
     Raises
     ------
@@ -120,8 +124,8 @@ def build(
     with timed(seconds, "fit"):
         yield Progress(0.0, "Reading the reference head")
         reference = load_head()
-        result = yield from portion(build_head(reference, scan.mesh, landmarks), 0.02, 0.95)
-    yield Progress(0.95, "Placing the head")
+        result = yield from portion(build_head(reference, scan.mesh, landmarks, detail), 0.02, 0.9)
+    yield Progress(0.9, "Placing the head")
     report = {
         "scan": scan.report,
         "fit": result.fit,
@@ -130,7 +134,7 @@ def build(
         "seconds": seconds,
         "versions": versions(),
     }
-    with timed(seconds, "place"):
+    with timed(seconds, "place"), _taken_back(scan_object):
         created = scan_object is None
         if created:
             scan_object = add_scan(scan, f"{name} Scan", scene)
@@ -139,12 +143,15 @@ def build(
             (scene or bpy.context.scene).collection.objects.unlink(scan_object)
             scan_object.hide_viewport = True
         skin = next(obj for obj in collection.objects if heads.is_skin(obj))
-        dress_head(skin)
+        if result.detail is not None:
+            yield Progress(0.92, "Packing the detail maps")
+            write_images(skin, result.detail)
+        yield from portion(dressing(skin), 0.94, 1.0)
     heads.write_report(skin, report)
     return skin, report
 
 
-def build_alone(path, name: str, unit: str | None = None, up: str | None = None) -> Work:
+def build_alone(path, name: str, unit: str | None = None, up: str | None = None, detail: int = SIZE) -> Work:
     """A scan file to a head without anybody's landmarks; returns what `build` does.
 
     Raises
@@ -152,5 +159,19 @@ def build_alone(path, name: str, unit: str | None = None, up: str | None = None)
     InputError : the file cannot be read, is no head, or shows no face.
     """
     scan, found = yield from portion(load_scan_alone(path, unit, up), 0.0, 0.35)
-    skin, report = yield from portion(build(scan, found.sure(), name), 0.35, 1.0)
+    skin, report = yield from portion(build(scan, found.sure(), name, detail=detail), 0.35, 1.0)
     return skin, report
+
+
+@contextmanager
+def _taken_back(scan_object: bpy.types.Object | None):
+    """If the work inside fails or is cancelled, whatever it added to the file goes."""
+    before = datablocks()
+    seen = None if scan_object is None else (scan_object.hide_render, scan_object.get(heads.PART))
+    try:
+        yield
+    except BaseException:
+        bpy.data.batch_remove(datablocks() - before)
+        if seen is not None:
+            scan_object.hide_render, scan_object[heads.PART] = seen[0], seen[1] or "scan"
+        raise

@@ -11,9 +11,11 @@ from scipy.ndimage import distance_transform_edt
 from scipy.spatial import cKDTree
 
 from ..sim.mesh import Mesh, vertex_normals
+from ..sim.progress import Progress, Work
 from .skin_paint import adjacency, smoothed, spread
 
 NEIGHBOURS = 4
+BLOCK = 60_000  # texels painted between two steps of progress
 #: mm beyond the scan's own spacing within which its colour counts fully, and beyond which it does not count
 NEAR, FAR = 1.5, 4.0
 SIZE = 768  # pixels: texels of about 0.7 mm, finer than most scans
@@ -131,25 +133,34 @@ def texels(skin: Mesh, size: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return index, corners[np.concatenate(owner)[first]], np.concatenate(inside)[first]
 
 
-def colour_image(skin: Mesh, source: ScanColour, inner: np.ndarray, name: str, size: int | None = None):
-    """Paint the scan's colours on the skin's UV map: (packed image, linear colour (n, 3) per vertex) or None.
+def colour_image(skin: Mesh, source: ScanColour, inner: np.ndarray, name: str, size: int | None = None) -> Work:
+    """Work painting the scan's colours on the skin's UV map: (packed image, linear colour (n, 3) per vertex) or None.
 
     None if the scan has no part near the skin, or the skin has no UV map.
     """
+    yield Progress(0.0, "Painting the skin")
     found = vertex_colour(skin, source, inner)
     if found is None or skin.uv is None:
         return None
     colour, gain = found
     size = size or SIZE
+    yield Progress(0.2, "Painting the skin")
     index, corners, weights = texels(skin, size)
     normals = vertex_normals(skin.vertices, skin.triangles)
 
-    def across(values: np.ndarray) -> np.ndarray:
-        return np.einsum("kc,kc...->k...", weights, values[corners])
+    places, facing, hidden = skin.vertices, normals, np.clip(inner, 0, 1)
+    painted = np.empty((len(index), 3))
+    for start in range(0, len(index), BLOCK):
+        yield Progress(0.3 + 0.6 * start / len(index), "Painting the skin")
+        part = slice(start, start + BLOCK)
 
-    fine, confidence = source.at(across(skin.vertices), across(normals))
-    confidence = (confidence * (1 - across(np.clip(inner, 0, 1))))[:, None]
-    painted = (confidence * fine + (1 - confidence) * across(colour)) * across(gain)[:, None]
+        def across(values: np.ndarray, part=part) -> np.ndarray:
+            return np.einsum("kc,kc...->k...", weights[part], values[corners[part]])
+
+        fine, confidence = source.at(across(places), across(facing))
+        confidence = (confidence * (1 - across(hidden)))[:, None]
+        painted[part] = (confidence * fine + (1 - confidence) * across(colour)) * across(gain)[:, None]
+    yield Progress(0.9, "Painting the skin")
     pixels = np.zeros((size * size, 3))
     pixels[index] = np.clip(painted, 0, 1)
     covered = np.zeros(size * size, dtype=bool)

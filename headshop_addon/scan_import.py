@@ -132,16 +132,17 @@ def _reason(error: Exception, printed: str) -> str:
 @contextmanager
 def _scratch_scene():
     """A scene of its own as the context's, and after it every datablock that appeared is removed."""
-    before = _datablocks()
+    before = datablocks()
     scene = bpy.data.scenes.new("Head Shop import")
     try:
         with bpy.context.temp_override(scene=scene, view_layer=scene.view_layers[0], collection=scene.collection):
             yield scene
     finally:
-        bpy.data.batch_remove(_datablocks() - before)
+        bpy.data.batch_remove(datablocks() - before)
 
 
-def _datablocks() -> set:
+def datablocks() -> set:
+    """Every datablock of the file."""
     return {
         block
         for prop in bpy.data.bl_rna.properties
