@@ -6,8 +6,8 @@ from pathlib import Path
 
 import bpy
 
+from ..sim.detail.detail_map import DetailMaps
 from ..sim.detail.files import displacement_png, normal_png
-from ..sim.detail.maps import DetailMaps
 from . import heads
 from .detail_nodes import DetailImages, use_detail
 

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import bpy
 
-from ..sim.detail.maps import DEEPEST
+from ..sim.detail.detail_map import DEEPEST
 from .shader_nodes import Graph, socket
 
 NORMAL_NODE, DISPLACEMENT_NODE, UV_NODE = "Head Shop Normal Map", "Head Shop Displacement", "Head Shop UV"

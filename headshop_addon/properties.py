@@ -16,7 +16,8 @@ from bpy.props import (
     PointerProperty,
 )
 
-from . import heads, live, muscle_names
+from ..sim.adapt.fit_colour import LIMIT
+from . import detail_images, heads, heat_map, live, muscle_names
 from .class_registry import register_all, unregister_all
 
 #: How a landmark got its place.
@@ -25,6 +26,28 @@ STATES = (
     ("DERIVED", "Estimated", "Carried over from the reference head by the landmarks already placed", "KEYFRAME", 1),
     ("PLACED", "Placed", "Placed by hand or read from a file", "KEYFRAME_HLT", 2),
 )
+
+
+#: How fine detail is shown.
+DETAIL = (
+    ("NONE", "None", "The smooth skin alone"),
+    ("NORMAL", "Normal Map", "Shading shows the detail; costs next to nothing"),
+    ("DISPLACEMENT", "Displacement", "The rendered surface itself is moved; silhouettes show the detail too"),
+)
+
+
+def _on_detail(group, _context):
+    detail_images.show(group.id_data, group.detail)
+
+
+def _on_show_fit(group, _context):
+    heat_map.show(group.id_data, group.show_fit, group.fit_range)
+    heat_map.solid_views(group.show_fit)
+
+
+def _on_fit_range(group, _context):
+    if group.show_fit and heat_map.has_fit(group.id_data):
+        heat_map.paint(group.id_data, group.fit_range)
 
 
 def _is_scan(_scene, obj):
@@ -87,6 +110,34 @@ class HEADSHOP_PG_object(bpy.types.PropertyGroup):
         default=True,
         options=set(),
         update=live.on_switch,
+    )
+    detail: EnumProperty(
+        name="Detail",
+        description="How the scan's fine detail is shown, which the mesh cannot follow",
+        items=DETAIL,
+        default="NORMAL",
+        options=set(),
+        update=_on_detail,
+    )
+    show_fit: BoolProperty(
+        name="Show Fit",
+        description="Colour the skin by its distance from the scan: blue inside, red outside, grey where it was invented",
+        default=False,
+        options=set(),
+        update=_on_show_fit,
+    )
+    fit_range: FloatProperty(
+        name="Range",
+        description="Distance from the scan at the ends of the colour scale, in millimetres",
+        default=LIMIT,
+        min=0.01,
+        soft_min=0.1,
+        soft_max=5.0,
+        max=100.0,
+        precision=2,
+        step=10,
+        options=set(),
+        update=_on_fit_range,
     )
 
 

@@ -3,7 +3,7 @@
 
 import bpy
 
-from ..headshop_addon import active, dependencies, heads, scan_landmarks
+from ..headshop_addon import active, dependencies, detail_images, heads, heat_map, scan_landmarks
 from .common import SidebarPanel, hint, progress
 
 #: Key in the fit report -> what to call it.
@@ -45,7 +45,12 @@ def _result(layout, context, skin):
             side = row.row()
             side.alignment = "RIGHT"
             side.label(text=f"{fit[key]:.2f} mm")
+    if "sentence" in fit:
+        hint(layout, context, fit["sentence"], "CHECKMARK")
     _show(layout, skin)
+    _fit(layout, context, skin)
+    if detail_images.images_of(skin) is not None:
+        layout.prop(skin.headshop, "detail")
     column = layout.column(align=True)
     column.operator("headshop.dress_head", icon="MATERIAL")
     column.operator("headshop.repack_uv", icon="UV")
@@ -63,6 +68,22 @@ def _show(layout, skin):
     scan = heads.scan_of(skin)
     if scan is not None:
         row.prop(scan, "hide_viewport", text="Scan", toggle=True, invert_checkbox=True)
+
+
+def _fit(layout, context, skin):
+    """The heat map's switch, scale and legend."""
+    if not heat_map.has_fit(skin):
+        return
+    settings = skin.headshop
+    column = layout.column(align=True)
+    row = column.row(align=True)
+    row.prop(settings, "show_fit", toggle=True, icon="COLOR")
+    if settings.show_fit:
+        row.prop(settings, "fit_range", text="mm")
+        end = f"{settings.fit_range:.2f} mm"
+        hint(
+            layout, context, f"Blue: {end} inside the scan. White: on it. Red: {end} outside. Grey: invented.", "BLANK1"
+        )
 
 
 def classes():

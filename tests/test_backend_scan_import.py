@@ -40,9 +40,9 @@ def test_every_format(bpy, tmp_path, bowl, extension):
     bpy.context.scene.collection.objects.link(obj)
     _WRITERS[extension](bpy, path)
     bpy.context.view_layer.objects.active = obj
-    before = scan_import._datablocks()
+    before = scan_import.datablocks()
     scan = scan_import.read_scan(path)
-    assert scan_import._datablocks() == before
+    assert scan_import.datablocks() == before
     assert bpy.context.view_layer.objects.active == obj and bpy.context.scene.objects.keys() == ["bowl"]
     assert len(scan.triangles) == len(bowl.triangles)
     wanted = bowl.vertices / 1000

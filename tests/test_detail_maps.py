@@ -7,7 +7,8 @@ from scipy.ndimage import map_coordinates
 
 from headshop.sim.adapt.closest import Surface
 from headshop.sim.detail.chart import chart_of, texels
-from headshop.sim.detail.maps import DEEPEST, detail_maps
+from headshop.sim.detail.detail_map import DEEPEST
+from headshop.sim.detail.maps import detail_maps
 from headshop.sim.mesh import Mesh, vertex_normals
 from headshop.sim.mesh_subdivision import smoother
 from headshop.sim.progress import Progress, finish

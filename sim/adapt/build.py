@@ -7,7 +7,8 @@ import numpy as np
 
 from ..anatomy.head import Head
 from ..anatomy.landmark_names import SKIN
-from ..detail.maps import SIZE, DetailMaps, detail_maps
+from ..detail.detail_map import DetailMaps
+from ..detail.maps import SIZE, detail_maps
 from ..errors import InputError
 from ..mesh import Mesh
 from ..mesh_subdivision import drawn, smoother

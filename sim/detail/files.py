@@ -10,7 +10,7 @@ import zlib
 
 import numpy as np
 
-from .maps import DEEPEST, DetailMaps
+from .detail_map import DEEPEST, DetailMaps
 
 
 def displacement_png(maps: DetailMaps) -> bytes:

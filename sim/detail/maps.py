@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Displacement and normal map of a fitted head: what of the scan is finer than the mesh."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.ndimage import distance_transform_edt, gaussian_filter, zoom
 
@@ -10,26 +8,13 @@ from ..adapt.closest import Surface
 from ..mesh import Mesh
 from ..progress import Progress, Work, portion
 from .chart import Chart, Texels, chart_of, texels
+from .detail_map import DEEPEST, DetailMaps
 from .height import heights
 
 #: Texels along a side: half a millimetre each on a head.
 SIZE = 1024
 FADE = 8.0  # mm over which detail runs out beside places without data
-DEEPEST = 2.0  # mm, the most a map displaces
 STEEPEST = 1.2  # the most it tilts: tangent of an angle
-
-
-@dataclass(frozen=True, eq=False)
-class DetailMaps:
-    """displacement (size, size) float32, mm along the normal, 0 where nothing is known; normal (size, size, 3) float32,
-    unit vectors in tangent space (x along u, y along v, z outward: OpenGL's convention). Row 0 lies at v = 0.
-
-    report : share of the skin with detail, and its root mean square and greatest height in mm
-    """
-
-    displacement: np.ndarray
-    normal: np.ndarray
-    report: dict
 
 
 def detail_maps(skin: Mesh, target: Surface, inner: np.ndarray, size: int = SIZE) -> Work:
