@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Scan files to arrays: PLY by our own reader, everything else through Blender's importers in a scene of its own.
+"""Scan files to arrays: PLY and cylindrical range maps by our own readers, the rest through Blender's importers.
 
-Blender's PLY importer accepts truncated files without a word, so PLY does not go through it. The current scene, its
-selection and all datablocks are left as they were.
+Blender's PLY importer accepts truncated files without a word, so PLY does not go through it. Its importers work in a
+scene of their own: the current scene, its selection and all datablocks are left as they were.
 """
 
 import struct
@@ -12,6 +12,9 @@ from pathlib import Path
 import bpy
 import numpy as np
 
+from ..sim.cylindrical.grid_mesh import to_mesh
+from ..sim.cylindrical.map_files import EXTENSIONS as MAPS
+from ..sim.cylindrical.map_files import is_range_map, read_range_map
 from ..sim.errors import InputError
 from ..sim.mesh import Mesh
 from ..sim.scan.ply import read_ply
@@ -55,7 +58,7 @@ _IMPORTERS = {
 }
 #: Blender's axes back to the file's, where they are known to differ: glTF is Y up.
 _FILE_AXES = dict.fromkeys((".glb", ".gltf"), np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]]))
-EXTENSIONS = (".ply", *_IMPORTERS)
+EXTENSIONS = (".ply", *_IMPORTERS, *MAPS)
 
 
 def check_file(path) -> Path:
@@ -70,7 +73,7 @@ def check_file(path) -> Path:
         raise InputError(f"{path} is a folder: give the scan file in it.")
     if not path.is_file():
         raise InputError(f"There is no file {path}: check the name of the scan.")
-    if path.suffix.lower() not in EXTENSIONS:
+    if path.suffix.lower() not in EXTENSIONS and not is_range_map(path):
         kinds = ", ".join(extension[1:].upper() for extension in EXTENSIONS)
         raise InputError(f"{path.name} is not of a kind that is read ({kinds}): export the scan as one of them.")
     if path.stat().st_size == 0:
@@ -81,6 +84,8 @@ def check_file(path) -> Path:
 def read_scan(path) -> Mesh:
     """All meshes of a scan file as one, in the file's own units and axes (USD and FBX: in metres, Z up).
 
+    A range map becomes the mesh of its texels in mm, Z up, its voids and jumps as holes (`sim.cylindrical`).
+
     Raises
     ------
     InputError : missing, empty, truncated, of an unknown kind, not what its name says, or without faces.
@@ -89,6 +94,8 @@ def read_scan(path) -> Mesh:
     extension = path.suffix.lower()
     if extension == ".ply":
         return read_ply(path)
+    if is_range_map(path):
+        return to_mesh(read_range_map(path))
     _check_length(path, extension)
     with _scratch_scene() as scene:
         with quiet() as printed:

@@ -24,7 +24,7 @@ UP = (
 
 
 class HEADSHOP_OT_import_scan(Simple, ImportHelper, bpy.types.Operator):
-    """Read a head scan (PLY, OBJ, STL, glTF, USD, FBX), clean it and set it upright in real size"""
+    """Read a head scan (PLY, OBJ, STL, glTF, USD, FBX or a range map), clean it and set it upright in real size"""
 
     bl_idname = "headshop.import_scan"
     bl_label = "Import Scan"
@@ -32,7 +32,7 @@ class HEADSHOP_OT_import_scan(Simple, ImportHelper, bpy.types.Operator):
 
     filename_ext = ""
     filter_glob: bpy.props.StringProperty(
-        default="*.ply;*.obj;*.stl;*.glb;*.gltf;*.usd;*.usda;*.usdc;*.usdz;*.fbx", options={"HIDDEN"}
+        default="*.ply;*.obj;*.stl;*.glb;*.gltf;*.usd;*.usda;*.usdc;*.usdz;*.fbx;*.ech;*.npz;*.json", options={"HIDDEN"}
     )
     unit: bpy.props.EnumProperty(name="Unit", description="Unit of length in the file", items=UNITS)
     up: bpy.props.EnumProperty(name="Up", description="Direction of the crown of the head in the file", items=UP)
