@@ -36,6 +36,7 @@ check: $(READY)
 assets: $(READY)
 	$(ONE) $(PY) -m headshop.assets.generators.make_reference_head
 	$(ONE) $(PY) -m headshop.assets.generators.make_strengths
+	$(ONE) $(PY) -m headshop.assets.generators.make_expression_responses
 
 sheets: $(READY)
 	$(PY) -m headshop.assets.generators.sheets out/sheets

@@ -14,7 +14,7 @@ from .fine_fit import Anchors
 
 TOGETHER = 3.0  # weight of a pair of rim points, against 1 for a point of data
 CLOSED = 0.3  # opening of the lids against the reference's below which an eye counts as closed
-SHUT = 1.2  # mm: margins of lids this close on the reference lie on each other
+SHUT = 1.2  # mm: lips and margins of lids this close on the reference lie on each other
 
 
 def rims(reference: Head) -> np.ndarray:
@@ -32,7 +32,7 @@ def _rim_of(reference: Head, rim, name):
 
 
 def lip_pairs(reference: Head, rim) -> np.ndarray:
-    """(k, 2) vertices of the upper and lower lip's rim that lie on each other on the reference."""
+    """(k, 2) vertices of the upper and lower lip's rim that lie on each other on the reference; none where it parts them."""
     v = reference.skin.vertices
     upper, lower = (_rim_of(reference, rim, f"lip_{x}") for x in ("upper", "lower"))
     if len(upper) == 0 or len(lower) == 0:
@@ -41,7 +41,8 @@ def lip_pairs(reference: Head, rim) -> np.ndarray:
     pairs = np.concatenate(
         [np.stack([upper, lower[gap.argmin(axis=1)]], axis=1), np.stack([upper[gap.argmin(axis=0)], lower], axis=1)]
     )
-    return np.unique(pairs, axis=0)
+    pairs = np.unique(pairs, axis=0)
+    return pairs[np.linalg.norm(v[pairs[:, 0]] - v[pairs[:, 1]], axis=1) < SHUT]
 
 
 def lip_linings(reference: Head, gap: float = 3.0) -> np.ndarray:

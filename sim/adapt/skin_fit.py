@@ -33,13 +33,14 @@ HOLD = 0.15  # weight in the last stage of a landmark picked to 1 mm, against 1 
 class SkinFit:
     """What `fit_skin` returns.
 
-    reference : the head that was fitted: the reference, its lids shut where the scan's are
+    reference : the head that was fitted: the reference, its lids shut where the scan's are, its lips parted if they are
     fitted : the skin after the last stage, as it is drawn
     cage (n, 3) mm : the skin that is drawn like that
     landmarks : name -> (3,) mm, given and completed targets
     outer (t, 3) : triangles a scanner can see; target : the scan as used (turned if it was inside out)
     closed : sides ("l", "r") of closed eyes
     unseen (n,) bool : vertices on and around ears that the scan does not show
+    lips_closed : ``reference`` before its lips were parted; the same where they were not
     """
 
     reference: Head
@@ -50,6 +51,7 @@ class SkinFit:
     target: Surface
     closed: list[str]
     unseen: np.ndarray
+    lips_closed: Head
 
 
 def group(head: Head, name: str) -> np.ndarray:
@@ -75,7 +77,8 @@ def fit_skin(reference: Head, target: Surface, given: dict[str, np.ndarray]) -> 
 
     It is the surface drawn of the skin, the limit of its subdivision, that is laid on the scan.
     """
-    whole, closed = as_scanned(reference, given)
+    lips_closed, closed = as_scanned(reference, given)
+    whole, given, lips = with_lips_as_scanned(lips_closed, target, given)
     reference = whole.with_vertices({"skin": drawn(whole.skin.faces, whole.skin.vertices)})
     skin = reference.skin
     n = len(skin.vertices)
@@ -93,6 +96,7 @@ def fit_skin(reference: Head, target: Surface, given: dict[str, np.ndarray]) -> 
     turn, _ = similarity(marks, goal)
     margin, margin_goal = lid_margins(reference, rim, given, turn, closed)
     give[np.isin(names, LID_MARKS) & known] += CARRIED * (len(margin) > 0)
+    margin, margin_goal = np.concatenate([margin, lips[0]]), np.concatenate([margin_goal, lips[1]])
     give = np.concatenate([give, np.full(len(margin), PICKED)])
 
     yield Progress(0.0, "Warp to the landmarks")
@@ -136,7 +140,7 @@ def fit_skin(reference: Head, target: Surface, given: dict[str, np.ndarray]) -> 
             yield Progress(0.4 + 0.6 * next(work), "Reach the scan")
         except StopIteration as stop:
             fitted = stop.value
-    return SkinFit(whole, fitted, fitted.cage, landmarks, outer, target, closed, unseen)
+    return SkinFit(whole, fitted, fitted.cage, landmarks, outer, target, closed, unseen, lips_closed)
 
 
 def as_scanned(reference: Head, given) -> tuple[Head, tuple[str, ...]]:
@@ -145,6 +149,18 @@ def as_scanned(reference: Head, given) -> tuple[Head, tuple[str, ...]]:
     names = {name: rest[name] for name in SKIN if name in rest}
     closed = tuple(closed_eyes(reference, complete_positions(names, given), given))
     return (with_shut_eyes(reference, closed) if closed else reference), closed
+
+
+def with_lips_as_scanned(reference: Head, target: Surface, given):
+    """The reference with its lips parted if the scan's are, the landmarks to fit it by, and the edges of its lips:
+    vertices (k,) and places (k, 3) mm."""
+    from ..relax.parted import parted_lips, with_parted_lips
+
+    found = parted_lips(reference, target, given)
+    if found is None:
+        return reference, given, (np.zeros(0, dtype=int), np.zeros((0, 3)))
+    given = {name: place for name, place in given.items() if name != "sto"}  # it lies in mid-air
+    return with_parted_lips(reference, found.expression), given, (found.rim, found.edges)
 
 
 def feature_triangles(reference: Head, names) -> np.ndarray:

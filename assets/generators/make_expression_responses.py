@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Simulate jaw and muscles one by one on the reference head: ``assets/tables/expression_responses.npz``.
+
+``python -m headshop.assets.generators.make_expression_responses`` after the reference head or the tissue has changed.
+"""
+
+import io
+import sys
+
+import numpy as np
+
+from ...sim.acting.pose import Pose, control
+from ...sim.anatomy.storage import REFERENCE, load_head, write_atomically
+from ...sim.relax.responses import MUSCLES, OPENINGS, TABLE, UNPAIRED, mirrored_vertices
+from ...sim.tissue.model import build_model
+from ...sim.tissue.solver import rest_state, solve
+
+ITERATIONS = 300
+STILL = 0.02  # mm: what moves less stays, so that the table packs well
+
+
+def main(argv: list[str]) -> int:
+    """Write the table anew, or to the file named."""
+    head = load_head(REFERENCE)
+    model = build_model(head)
+    rest = rest_state(model).skin
+
+    def moved(pose):
+        field = solve(model, control(model, pose), max_iterations=ITERATIONS).state.skin - rest
+        field[np.linalg.norm(field, axis=1) < STILL] = 0
+        return field
+
+    jaw = [moved(Pose(jaw_open=opening)) for opening in OPENINGS]
+    muscles = [moved(Pose({name if name in UNPAIRED else f"{name}_l": 1.0})) for name in MUSCLES]
+    stream = io.BytesIO()
+    np.savez_compressed(
+        stream,
+        jaw=np.array(jaw, dtype=np.float16),
+        fields=np.array(muscles, dtype=np.float16),
+        mirror=mirrored_vertices(head.skin.vertices),
+    )
+    write_atomically(argv[0] if argv else TABLE, stream.getvalue())
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which part of a face is the person and which the expression.
+
+Points of a face, laid on the reference by what expressions do not move, differ from the reference's by a person's shape
+``d``, by what jaw and muscles do, ``E a``, and by what our muscles do not do as that person's did, ``e``:
+
+    y = d + E a + e + noise,   d ~ N(0, K),  e ~ N(0, K_e),  a >= 0
+
+``K`` is the covariance of neutral people (`people`), ``K_e`` is large only where ``E a`` is. The contractions are those
+of generalised least squares with shrinkage, the rest is the mean of a Gaussian process given the data (Rasmussen and
+Williams 2006, equations 2.25 and 2.42).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve, solve_triangular
+from scipy.optimize import nnls
+from scipy.spatial.distance import cdist
+
+from .responses import Responses
+
+NOISE = 0.3  # mm
+USUAL = 0.5  # contraction of a muscle, and half the widest opening of the jaw: what shrinkage expects
+#: What our muscles do otherwise than a person's: share of what they do, and its reach in mm.
+UNLIKE, REACH = 0.35, 16.0
+LEAST = 0.4  # mm of the same where little moves, at the mouth
+ROUNDS = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Expression:
+    """jaw : opening, 0..1; muscles : name -> contraction; displacement (n, 3) mm of the reference's skin by both, and
+    by what they leave unexplained; modelled (n, 3) mm : by both alone."""
+
+    jaw: float
+    muscles: dict[str, float]
+    displacement: np.ndarray
+    modelled: np.ndarray
+
+
+def explain(table: Responses, vertices, sampling, offsets, people, names=None, noise=NOISE) -> Expression:
+    """The `Expression` of a face.
+
+    Parameters
+    ----------
+    table : how the reference's skin answers
+    vertices : (n, 3) mm, the reference's skin
+    sampling : (k, n) sparse, rows that give the points from the vertices
+    offsets : (k, 3) mm, the face's points less the reference's, laid on it
+    people : (3 k, 3 k) mm², covariance of neutral people's
+    names : the muscles to consider (all of the table by default)
+    noise : mm, one or (k,), by which points may be wrong
+    """
+    pick = [k for k, name in enumerate(table.names) if names is None or name in names]
+    fields = table.fields[pick]
+    y = np.asarray(offsets, dtype=float).ravel()
+    still = np.repeat(np.broadcast_to(noise, len(offsets)) ** 2, 3)
+    # The lips touch, but what moves one does not move the other: distances are those of an open mouth.
+    parted = vertices + table.jaw_at(0.35)
+    places = sampling @ parted
+    alike = np.exp(-cdist(places, places, "sqeuclidean") / (2 * REACH**2))
+    sampled = np.stack([(sampling @ field).ravel() for field in fields], axis=1)
+    opening, contraction = 0.2, np.full(len(pick), 0.3)
+    for _ in range(ROUNDS):
+        unlike = unlikeness(table, fields, opening, contraction)
+        error = sampling @ unlike
+        own = alike * error[:, None] * error[None, :]
+        total = people + np.kron(own, np.eye(3)) + np.diag(still)
+        factor = cho_factor(total, lower=True)
+        step = max(opening, 0.05)
+        jaw = (sampling @ table.jaw_at(step)).ravel() / step
+        system = solve_triangular(factor[0], np.column_stack([jaw, sampled]), lower=True)
+        right = solve_triangular(factor[0], y, lower=True)
+        shrink = np.eye(len(pick) + 1) / USUAL
+        found, _ = nnls(np.concatenate([system, shrink]), np.concatenate([right, np.zeros(len(pick) + 1)]))
+        opening, contraction = float(found[0]), found[1:]
+    modelled = table.jaw_at(opening) + np.einsum("k,knj->nj", contraction, fields)
+    left = y - jaw * opening - sampled @ contraction
+    weights = cho_solve(factor, left).reshape(-1, 3)
+    across = np.exp(-cdist(parted, places, "sqeuclidean") / (2 * REACH**2)) * unlike[:, None] * error[None, :]
+    muscles = {table.names[k]: float(a) for k, a in zip(pick, contraction, strict=True)}
+    return Expression(opening, muscles, modelled + across @ weights, modelled)
+
+
+def unlikeness(table: Responses, fields, opening: float, contraction) -> np.ndarray:
+    """(n,) mm, the deviation of what a person's muscles do from what ours do."""
+    moved = (np.linalg.norm(fields, axis=2) * contraction[:, None]) ** 2
+    jaw = np.linalg.norm(table.jaw_at(opening), axis=1) ** 2
+    near = np.clip(table.reach / 6.0, 0, 1)
+    return np.sqrt(UNLIKE**2 * (moved.sum(axis=0) + jaw) + (LEAST * near) ** 2)

@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The edges of parted lips on a scan, looked for between the landmarks of the lips' red.
+
+Between parted lips a scan has teeth, set back and with edges all round, or nothing; between closed ones a crease, and at
+most a crack of missing data.
+"""
+
+import numpy as np
+
+from ..adapt.closest import Surface
+
+MARKS = ("ls", "li", "ch_l", "ch_r")
+STEPS, DEEP = 60, 25.0  # places looked at from lip to lip; mm looked in front and behind
+STEP = 2.0  # mm: a step in depth this large from one place to the next is an edge
+EATEN = 1.0  # mm by which a scanner loses an edge beside nothing
+SPECK = 1.2  # mm: a hole no longer than this, with data as deep on both sides, is none
+ROUGH = 1.0  # mm by which an edge usually strays from a smooth line
+FEWEST = 10  # edges that make a lip
+MIDDLE = 0.3  # shares of the way to the corner up to here tell how wide the mouth is open
+
+
+def lip_edges(target: Surface, given, forward, shares):
+    """Edges of the upper and the lower lip (k, 2, 3) mm, NaN where there are none.
+
+    Parameters
+    ----------
+    given : landmarks, name -> (3,) mm; without all of `MARKS` nothing is found
+    forward : (3,) unit vector, out of the face
+    shares : (k,) where to look: share of the way from the middle of the mouth to its left corner (to its right: below 0)
+    """
+    shares = np.asarray(shares, dtype=float)
+    out = np.full((len(shares), 2, 3), np.nan)
+    if any(name not in given for name in MARKS):
+        return out
+    aside = np.abs(shares)[:, None]
+    corner = np.where(shares[:, None] > 0, given["ch_l"], given["ch_r"])
+    upper, lower = (given[name] + aside * (corner - given[name]) for name in ("ls", "li"))
+    lines = upper[:, None] + np.linspace(0, 1, STEPS)[:, None] * (lower - upper)[:, None]
+    depth = depths(target, lines.reshape(-1, 3), forward).reshape(len(shares), STEPS)
+    for k, (line, behind) in enumerate(zip(lines, depth, strict=True)):
+        length = np.linalg.norm(line[-1] - line[0])
+        found = first_and_last_edge(behind, int(SPECK / length * STEPS))
+        if found is None:
+            continue
+        for side, (at, hole) in enumerate(found):
+            way = (line[-1] - line[0]) / length * (1 if side == 0 else -1)
+            out[k, side] = line[at] - behind[at] * forward + EATEN * hole * way
+    return out
+
+
+def smoothed(edges, shares, at) -> np.ndarray:
+    """The edges (k, 2, 3) mm found at ``shares`` (k,) as a smooth curve along each lip: places (m, 2, 3) ``at`` (m,).
+
+    A cubic, by least squares that leave strays out of account ever more strictly (Cauchy's weights). NaN where too few
+    were found.
+    """
+    there = np.isfinite(edges).all(axis=(1, 2))
+    out = np.full((len(at), 2, 3), np.nan)
+    if there.sum() < FEWEST:
+        return out
+    basis, wanted = (np.stack([x**power for power in range(4)], axis=1) for x in (shares[there], at))
+    for lip in range(2):
+        weight = np.ones(there.sum())
+        for rough in ROUGH * np.array([5, 5, 4, 4, 3, 3, 2, 2, 1, 1, 1, 1]):
+            rooted = np.sqrt(weight)[:, None]
+            found = np.linalg.lstsq(rooted * basis, rooted * edges[there, lip], rcond=None)[0]
+            off = np.linalg.norm(edges[there, lip] - basis @ found, axis=1)
+            weight = 1 / (1 + (off / rough) ** 2) ** 2
+        out[:, lip] = wanted @ found
+    inside = (at > shares[there].min() - 0.1) & (at < shares[there].max() + 0.1)
+    out[~inside] = np.nan
+    return out
+
+
+def opening(edges, shares) -> float:
+    """mm between the lips in the middle of the mouth, of ``edges`` (k, 2, 3) at ``shares`` (k,); 0 where none are."""
+    apart = np.linalg.norm(edges[:, 0] - edges[:, 1], axis=1)[np.abs(shares) < MIDDLE]
+    return float(np.median(np.nan_to_num(apart))) if len(apart) else 0.0
+
+
+def depths(target: Surface, points, forward) -> np.ndarray:
+    """(k,) mm by which the scan's outermost surface lies behind each of the ``points`` (k, 3); NaN: there is none."""
+    line, along, _, _ = target.crossings(points, np.tile(forward, (len(points), 1)), DEEP)
+    out = np.full(len(points), np.nan)
+    order = np.argsort(along, kind="stable")
+    out[line[order]] = -along[order]  # the last one written lies farthest out
+    return out
+
+
+def first_and_last_edge(depth: np.ndarray, speck: int):
+    """On a line from lip to lip: ((place, beside nothing), ...) where the upper lip ends and where the lower begins.
+
+    depth (k,) mm, NaN where there is nothing; speck : holes this long may be chance. None: the scan runs from lip to lip
+    without an edge.
+    """
+    there = np.flatnonzero(np.isfinite(depth))
+    if len(there) < 2:
+        return None
+    step = np.abs(np.diff(depth[there])) > STEP
+    hole = np.diff(there) - 1 > np.where(step, 0, speck)
+    edge = np.flatnonzero(hole | step)
+    if len(edge) == 0:
+        return None
+    first, last = edge[0], edge[-1]
+    return (there[first], bool(hole[first])), (there[last + 1], bool(hole[last]))
