@@ -121,22 +121,29 @@ def _placed(thick, under, over, ground, belly, cover):
 def narrowed(values, ring, reach=REACH):
     """The least of each value (c, s) and its neighbours."""
     for _ in range(reach):
-        wide = np.pad(values, ((1, 1), (0, 0)), mode="edge")
-        values = np.minimum(np.minimum(wide[:-2], values), wide[2:])
-        wide = np.pad(values, ((0, 0), (1, 1)), mode="wrap" if ring else "edge")
-        values = np.minimum(np.minimum(wide[:, :-2], values), wide[:, 2:])
+        for axis in (0, 1):
+            before, after = beside(values, axis, ring and axis == 1)
+            values = np.minimum(np.minimum(before, values), after)
     return values
 
 
 def smoothed(values, ring, rounds=REACH):
     """Values (c, s, ...) averaged with their neighbours, both ways, ``rounds`` times."""
-    rest = ((0, 0),) * (values.ndim - 2)
     for _ in range(rounds):
-        wide = np.pad(values, ((1, 1), (0, 0), *rest), mode="edge")
-        values = 0.25 * (wide[:-2] + wide[2:]) + 0.5 * values
-        wide = np.pad(values, ((0, 0), (1, 1), *rest), mode="wrap" if ring else "edge")
-        values = 0.25 * (wide[:, :-2] + wide[:, 2:]) + 0.5 * values
+        for axis in (0, 1):
+            before, after = beside(values, axis, ring and axis == 1)
+            values = 0.25 * (before + after) + 0.5 * values
     return values
+
+
+def beside(values, axis: int, closed: bool):
+    """The neighbours of values (c, s, ...) before and after them along ``axis``; the ends are their own if not closed."""
+    index = np.arange(values.shape[axis])
+    if closed:
+        before, after = np.roll(index, 1), np.roll(index, -1)
+    else:
+        before, after = np.maximum(index - 1, 0), np.minimum(index + 1, len(index) - 1)
+    return values.take(before, axis), values.take(after, axis)
 
 
 def sheet_normals(sheet, ring):

@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The soft tissue muscles live in: under the skin, outside bone, mouth and eyeballs (Kähler 2002, 5.2, item 3)."""
 
+from functools import cached_property
 from itertools import islice
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from ..mesh import Mesh, vertex_normals
-from ..triangle_projection import closest_on_triangles
+from ..triangle_projection import Triangles
 
 #: mm between the points a surface is sampled by.
 SPACING = 1.6
@@ -32,10 +33,15 @@ class Room:
         triangles = split(skin.faces)
         normals = vertex_normals(skin.vertices, triangles)
         self._lining = inner[triangles].all(axis=1)
-        self.skin = Samples(skin.vertices, triangles[~self._lining], normals)
+        self._seen = skin.vertices, triangles[~self._lining], normals
         self._whole = Samples(skin.vertices, triangles, normals, np.where(self._lining, SPACING / 2, SPACING))
         self.bones = [Samples(mesh.vertices, split(mesh.faces)) for mesh in bones]
         self.eyes = tuple(eyes)
+
+    @cached_property
+    def skin(self) -> "Samples":
+        """The skin that one sees."""
+        return Samples(*self._seen)
 
     def outward(self, points) -> np.ndarray:
         """(n, 3) unit direction to the skin's outside, smoothed over some mm."""
@@ -132,7 +138,7 @@ class Samples:
             points.append(np.einsum("wk,tkd->twd", w, corner[some]).reshape(-1, 3))
             owner.append(np.repeat(some, len(w)))
         self.points, self._owner = np.concatenate(points), np.concatenate(owner)
-        self._corner, self._bent = corner, bent
+        self._corner, self._bent, self._solid = corner, bent, Triangles(corner)
         self.normals = _unit(bent.mean(axis=1))[self._owner]
         self._tree = cKDTree(self.points)
 
@@ -148,8 +154,8 @@ class Samples:
         far, near = far.reshape(len(points), -1), near.reshape(len(points), -1)
         found = np.isfinite(far[:, 0])
         triangle = self._owner[np.where(np.isfinite(far), near, np.where(found[:, None], near[:, :1], 0))]
-        corner = self._corner[triangle.ravel()]
-        weights, distance = closest_on_triangles(np.repeat(points, count, axis=0), *corner.transpose(1, 0, 2))
+        rows = np.repeat(np.arange(len(points)), count)
+        weights, distance = self._solid.closest(points, rows, triangle.ravel())
         best = distance.reshape(-1, count).argmin(axis=1) + count * np.arange(len(points))
         weights, distance, triangle = weights[best], distance[best], triangle.ravel()[best]
         smooth = _unit(np.einsum("nk,nkd->nd", weights, self._bent[triangle]))
