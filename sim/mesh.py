@@ -54,13 +54,19 @@ class Mesh:
 
 def vertex_normals(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """(n, 3) unit normals, area-weighted; zero where a vertex has no triangle."""
-    a, b, c = (vertices[triangles[:, k]] for k in range(3))
-    normal = np.cross(b - a, c - a)
-    out = np.empty_like(vertices)
+    planes = vertices.T.copy()
+    normal = cross_sides(*(planes.take(triangles[:, k], axis=1) for k in range(3)))
+    out, corner = np.empty_like(vertices), triangles.ravel()
     for axis in range(3):
-        out[:, axis] = np.bincount(triangles.ravel(), np.repeat(normal[:, axis], 3), minlength=len(vertices))
+        out[:, axis] = np.bincount(corner, np.repeat(normal[axis], 3), minlength=len(vertices))
     length = np.linalg.norm(out, axis=1, keepdims=True)
     return out / np.where(length > 0, length, 1)
+
+
+def cross_sides(a, b, c) -> np.ndarray:
+    """(3, m): the cross product of the sides ``b - a`` and ``c - a``; all as planes (3, m), which is fastest."""
+    (ux, uy, uz), (vx, vy, vz) = b - a, c - a
+    return np.stack([uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx])
 
 
 def edges(faces: np.ndarray) -> np.ndarray:

@@ -8,6 +8,8 @@ from scipy.spatial import ConvexHull
 from headshop.sim import triangle_projection
 from headshop.sim.adapt import closest
 from headshop.sim.adapt.closest import Surface, least
+from headshop.sim.adapt.scan_surface import scan_surface
+from headshop.sim.mesh import Mesh
 from headshop.sim.triangle_projection import Triangles, closest_on_triangles
 
 
@@ -113,3 +115,60 @@ def test_the_same_twice(uneven):
     again = Surface(surface.vertices, surface.triangles)
     for name, value in vars(surface.closest(queries)).items():
         np.testing.assert_array_equal(value, getattr(again.closest(queries), name))
+
+
+def sheet(size, steps, z=0.0, up=True):
+    """A square of ``size`` mm in 2 steps² triangles at height z."""
+    side = np.linspace(0, size, steps + 1)
+    x, y = np.meshgrid(side, side, indexing="ij")
+    i = np.arange((steps + 1) ** 2).reshape(steps + 1, steps + 1)
+    a, b, c, d = (k.ravel() for k in (i[:-1, :-1], i[1:, :-1], i[1:, 1:], i[:-1, 1:]))
+    triangles = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
+    return np.stack([x, y, np.full_like(x, z)], -1).reshape(-1, 3), triangles if up else triangles[:, ::-1]
+
+
+def test_a_dense_surface_thinned_lies_where_it_lay():
+    (top, t), (low, u) = sheet(60, 80, 0.05), sheet(60, 80, -0.05, up=False)
+    both = Surface(np.concatenate([top, low]), np.concatenate([t, u + len(top)]))
+    assert both.coarser(len(both.triangles)) is both
+    thin = both.coarser(3000)
+    assert 1000 < len(thin.triangles) <= 3600
+    np.testing.assert_allclose(np.abs(thin.vertices[:, 2]), 0.05)  # sheets that face each other stay apart
+    assert thin.area.sum() == pytest.approx(2 * 60**2, rel=0.08)
+    assert np.isin(np.round(thin.face_normals[:, 2], 9), [-1, 1]).all()
+    inside = (np.abs(thin.vertices[:, :2] - 30) < 27).all(axis=1)
+    assert not thin.border_vertex[inside].any()  # no cracks
+    again = both.coarser(3000)
+    np.testing.assert_array_equal(thin.vertices, again.vertices)
+    np.testing.assert_array_equal(thin.triangles, again.triangles)
+
+
+def test_only_the_head_of_a_large_scan_is_looked_at(reference):
+    head = reference.skin
+    wall, triangles = sheet(1500, 60, -400.0)
+    scan = Mesh.from_triangles(
+        np.concatenate([head.vertices, wall - [750, 750, 0]]),
+        np.concatenate([head.triangles, triangles + len(head.vertices)]),
+    )
+    marks = reference.landmark_positions()
+    given = {name: marks[name] for name in ("ex_l", "ex_r", "prn", "gn", "t_l")}
+    whole = scan_surface(reference, scan, given)
+    assert len(whole.triangles) == len(scan.triangles)
+    some = scan_surface(reference, scan, given, most=len(head.triangles))
+    assert some.vertices[:, 2].min() > -300 and len(some.triangles) == len(head.triangles)
+    thin = scan_surface(reference, scan, given, most=2000)
+    assert len(thin.triangles) < 2600 and thin.closest(head.vertices).distance.mean() < 1.5
+    elsewhere = {name: place + [5000, 0, 0] for name, place in given.items()}
+    assert np.ptp(scan_surface(reference, scan, elsewhere, most=12000).vertices, axis=0).max() == pytest.approx(1500)
+
+
+def test_a_surface_turned_is_that_of_triangles_turned(uneven):
+    surface, queries = uneven
+    surface.normals  # noqa: B018 (asked for before and after: neither may matter)
+    for one in (surface.turned(), Surface(surface.vertices, surface.triangles).turned()):
+        other = Surface(surface.vertices, surface.triangles[:, ::-1])
+        np.testing.assert_allclose(one.normals, other.normals, atol=1e-12)
+        np.testing.assert_allclose(one.face_normals, other.face_normals, atol=1e-12)
+        mine, theirs = one.closest(queries), other.closest(queries)
+        np.testing.assert_allclose(mine.distance, theirs.distance, atol=1e-12)
+        np.testing.assert_allclose(mine.points, theirs.points, atol=1e-9)

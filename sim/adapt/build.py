@@ -20,10 +20,10 @@ from .follow import follow
 from .gate import check_against_scan, check_arrangement
 from .landmarks import require_usable
 from .rest import BONES
+from .scan_surface import scan_surface
 from .skin_fit import SkinFit, fit_skin, group
 
 REACH = 20.0  # mm: bone deeper under the skin than this is not measured
-NORMALS = 2.0  # mm over which the scan's normals are averaged
 POOR = 5.0  # mm: a mean distance in the face above which the fit is refused
 LITTLE = 0.08  # share of the face that must have data
 WITHIN = 1.0  # mm: skin counts as lying on the scan
@@ -64,7 +64,7 @@ def build_head(reference: Head, scan: Mesh, landmarks: dict[str, np.ndarray], de
     given = {n: np.asarray(p, dtype=float) for n, p in landmarks.items() if n in SKIN}
     require_usable(given, "The landmark set")
     yield Progress(0.0, "Looking at the scan")
-    target = Surface(scan.vertices, scan.triangles, smooth=NORMALS)
+    target = scan_surface(reference, scan, given)
     check_against_scan(given, target)
     check_arrangement(reference.landmark_positions(), given)
     fit = yield from portion(fit_skin(reference, target, given), 0.1, 0.7)

@@ -6,19 +6,20 @@ triangles that own the nearest samples are the candidates, and the covering radi
 """
 
 from dataclasses import dataclass
-from itertools import chain
+from functools import cached_property
 
 import numpy as np
-from scipy.sparse import coo_matrix
+from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
-from ..mesh import vertex_normals
+from ..mesh import cross_sides, vertex_normals
 from ..triangle_projection import Triangles
+from .cover import Cover
+from .merging import clustered, weld
 
-SAMPLES = 160_000  # a finer cover does not pay for the time its tree takes
 FIRST = 8  # nearest samples of a point that are looked at before it is known how many more must be
 BATCH = 4000  # points whose lists of samples are held at once
+ENOUGH = 300_000  # triangles that show all of a head that a mesh of some thousand vertices can follow
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,47 +37,6 @@ class Contacts:
     points: np.ndarray
     normals: np.ndarray
     border: np.ndarray
-
-
-def weld(vertices: np.ndarray, triangles: np.ndarray, tolerance: float = 1e-5):
-    """Merge coincident vertices (texture seams split them) and drop collapsed triangles.
-
-    Returns vertices (n, 3), triangles (m, 3).
-    """
-    span = max(float(np.ptp(vertices, axis=0).max()), 1e-9) if len(vertices) else 1.0
-    grid = np.round((vertices - vertices.min(axis=0)) / (tolerance * span)).astype(np.int64)
-    key = (grid[:, 0] << 42) ^ (grid[:, 1] << 21) ^ grid[:, 2]
-    _, first, back = np.unique(key, return_index=True, return_inverse=True)
-    merged = back.reshape(-1)[triangles]
-    vertices = vertices[first]
-    a, b, c = (vertices[merged[:, k]] for k in range(3))
-    area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
-    longest = np.maximum.reduce([((b - a) ** 2).sum(1), ((c - b) ** 2).sum(1), ((a - c) ** 2).sum(1)])
-    merged = merged[area > 1e-9 * np.maximum(longest, 1e-30)]
-    used, merged = np.unique(merged, return_inverse=True)
-    return vertices[used], merged.reshape(-1, 3).astype(np.int32)
-
-
-def spread(corners: np.ndarray, spacing: float):
-    """Sample points over triangles (m, 3, 3) -> points (s, 3), owner (s,), covering radius (m,) in mm."""
-    middle = corners.mean(axis=1)
-    reach = np.sqrt(((corners - middle[:, None]) ** 2).sum(2).max(1))
-    parts = np.clip(np.ceil(reach / spacing), 1, 24).astype(int)
-    while (parts**2).sum() > max(SAMPLES, 2 * len(corners)):
-        spacing *= 1.2
-        parts = np.clip(np.ceil(reach / spacing), 1, 24).astype(int)
-    points, owner = [], []
-    for n in np.unique(parts):
-        of = np.flatnonzero(parts == n)
-        i, j = np.divmod(np.arange(n * n), n)
-        up = i + j < n
-        # Middles of the n*n small triangles: the upright ones, then those standing on their tip.
-        b = np.concatenate([(i[up] + 1 / 3) / n, (i[(i + j) < n - 1] + 2 / 3) / n])
-        c = np.concatenate([(j[up] + 1 / 3) / n, (j[(i + j) < n - 1] + 2 / 3) / n])
-        weights = np.stack([1 - b - c, b, c], axis=1)
-        points.append(np.einsum("sk,mkx->msx", weights, corners[of]).reshape(-1, 3))
-        owner.append(np.repeat(of, len(weights)))
-    return np.concatenate(points), np.concatenate(owner), reach / parts
 
 
 def least(row, cost):
@@ -103,44 +63,78 @@ class Surface:
     """
 
     def __init__(self, vertices, triangles, smooth: float = 0.0):
-        vertices, triangles = np.asarray(vertices, dtype=float), np.asarray(triangles)
-        self.vertices, self.triangles = weld(vertices, triangles)
-        self.corners = self.vertices[self.triangles]
-        a, b, c = self.corners[:, 0], self.corners[:, 1], self.corners[:, 2]
-        cross = np.cross(b - a, c - a)
-        double = np.linalg.norm(cross, axis=1)
-        self.area = double / 2
-        self.face_normals = cross / double[:, None]
-        self._topology()
-        self.normals = self._smoothed(smooth)
-        # Finer than the triangles where there are few: less to try for each query.
-        spacing = max(float(np.median(np.sqrt(double))), 1e-6) * (0.55 if len(double) < 30_000 else 0.75)
-        self._samples, self._owner, self._cover = spread(self.corners, spacing)
-        self._radius = float(self._cover.max())
-        self._tree = cKDTree(self._samples)
-        self._solid = Triangles(self.corners)
+        self.vertices, self.triangles = weld(np.asarray(vertices, dtype=float), np.asarray(triangles))
+        self._smooth = smooth
+        planes = self.vertices.T.copy()
+        cross = cross_sides(*(planes.take(self.triangles[:, k], axis=1) for k in range(3)))
+        self._double = np.sqrt(cross[0] ** 2 + cross[1] ** 2 + cross[2] ** 2)
+        self.face_normals = (cross / self._double).T
 
-    def _topology(self):
+    # Found when first asked for: a scan of millions of triangles is asked little.
+
+    @property
+    def area(self) -> np.ndarray:
+        """(m,) mm² of each triangle."""
+        return self._double / 2
+
+    @cached_property
+    def corners(self) -> np.ndarray:
+        """(m, 3, 3) mm: the corners of each triangle."""
+        return self.vertices[self.triangles]
+
+    @cached_property
+    def _solid(self) -> Triangles:
+        return Triangles(self.corners)
+
+    @cached_property
+    def _cover(self) -> Cover:
+        return Cover(self.corners, self.area)
+
+    @cached_property
+    def _sides(self):
+        """Sides of the triangles, each once: vertices (e,) and (e,), and how many triangles it belongs to (e,)."""
         n = len(self.vertices)
-        t = self.triangles.astype(np.int64)
-        sides = np.sort(np.concatenate([t[:, [0, 1]], t[:, [1, 2]], t[:, [2, 0]]]), axis=1)
-        code, first, count = np.unique(sides[:, 0] * n + sides[:, 1], return_index=True, return_counts=True)
-        pair = sides[first]
-        self.edge_length = float(
-            np.median(np.linalg.norm(self.vertices[pair[:, 0]] - self.vertices[pair[:, 1]], axis=1))
-        )
-        link = coo_matrix((np.ones(len(pair)), (pair[:, 0], pair[:, 1])), shape=(n, n)).tocsr()
-        self._link = link + link.T
-        self.border_vertex = np.zeros(n, dtype=bool)
-        self.border_vertex[pair[count == 1].ravel()] = True
-        _, label = connected_components(self._link, directed=False)
-        #: Area in mm² of the connected piece each triangle belongs to: small pieces are specks.
-        piece = label[self.triangles[:, 0]]
-        self.piece_area = np.bincount(piece, self.area)[piece]
+        a, b, c = self.triangles.T.astype(np.int64)
+        code = np.concatenate([np.minimum(u, v) * n + np.maximum(u, v) for u, v in ((a, b), (b, c), (c, a))])
+        code.sort()
+        start = np.flatnonzero(np.concatenate([[True], code[1:] != code[:-1]])) if len(code) else code
+        return *np.divmod(code[start], n), np.diff(np.append(start, len(code)))
 
-    def _smoothed(self, radius):
+    @cached_property
+    def edge_length(self) -> float:
+        """Median length of the sides, mm."""
+        a, b, _ = self._sides
+        return float(np.median(np.linalg.norm(self.vertices[a] - self.vertices[b], axis=1)))
+
+    @cached_property
+    def border_vertex(self) -> np.ndarray:
+        """(n,) bool: vertices on open sides."""
+        a, b, count = self._sides
+        out = np.zeros(len(self.vertices), dtype=bool)
+        out[a[count == 1]] = out[b[count == 1]] = True
+        return out
+
+    @cached_property
+    def _link(self):
+        """(n, n) sparse: 1 where a side joins two vertices."""
+        a, b, _ = self._sides
+        link = csr_matrix((np.ones(len(a)), (a, b)), shape=(len(self.vertices),) * 2)
+        return link + link.T
+
+    @cached_property
+    def piece_area(self) -> np.ndarray:
+        """(m,) mm² of the connected piece each triangle belongs to: small pieces are specks."""
+        _, label = connected_components(self._link, directed=False)
+        piece = label[self.triangles[:, 0]]
+        return np.bincount(piece, self.area)[piece]
+
+    @cached_property
+    def normals(self) -> np.ndarray:
+        """(n, 3) unit, smoothed."""
         normals = vertex_normals(self.vertices, self.triangles)
-        rounds = int(np.clip(round((radius / max(self.edge_length, 1e-6)) ** 2), 0, 12)) if radius else 0
+        rounds = 0
+        if self._smooth:
+            rounds = int(np.clip(round((self._smooth / max(self.edge_length, 1e-6)) ** 2), 0, 12))
         for _ in range(rounds):
             normals = normals + self._link @ normals
             normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
@@ -149,11 +143,35 @@ class Surface:
     def turned(self) -> "Surface":
         """The same surface with its outside inside (for scans wound the wrong way round)."""
         out = object.__new__(Surface)
-        out.__dict__.update(self.__dict__)
-        out.triangles = self.triangles[:, ::-1]
-        out.corners = self.corners[:, ::-1]
-        out._solid = Triangles(out.corners)
-        out.normals, out.face_normals = -self.normals, -self.face_normals
+        kept = (
+            "vertices",
+            "_smooth",
+            "_double",
+            "_cover",
+            "_sides",
+            "edge_length",
+            "border_vertex",
+            "_link",
+            "piece_area",
+        )
+        out.__dict__.update({name: value for name, value in self.__dict__.items() if name in kept})
+        out.triangles, out.face_normals = self.triangles[:, ::-1], -self.face_normals
+        return out
+
+    def coarser(self, most: int = ENOUGH) -> "Surface":
+        """This surface with about ``most`` triangles, by merging vertices that are closest; itself where it has no more.
+
+        What is finer than the skin's own mesh tells a fit nothing but the scanner's noise.
+        """
+        if len(self.triangles) <= most:
+            return self
+        # A grid of cells cuts a surface into about 1.5 pieces, of 2 triangles each, per cell's area.
+        out, cell = self, np.sqrt(3 * self.area.sum() / most)
+        for _ in range(4):
+            out = Surface(*clustered(self.vertices, self.triangles, cell), self._smooth)
+            if len(out.triangles) <= 1.2 * most:
+                break
+            cell *= 1.05 * np.sqrt(len(out.triangles) / most)
         return out
 
     def _contacts(self, count, found, distance, triangle, weights) -> Contacts:
@@ -187,7 +205,7 @@ class Surface:
 
         def improve(row, owner, far):
             """Let the pairs of query and triangle compete, if their nearest sample is near enough."""
-            some = np.flatnonzero(far - self._cover[owner] < best[row])
+            some = np.flatnonzero(far - cover.radius[owner] < best[row])
             row, owner = self._once(row[some], owner[some])
             w, d = self._solid.closest(points, row, owner)
             at, pick = least(row, d)
@@ -195,34 +213,21 @@ class Surface:
             at, pick = at[better], pick[better]
             best[at], triangle[at], weights[at] = d[pick], owner[pick], w[pick]
 
-        far, sample = self._nearest(points, FIRST, reach)
+        cover = self._cover
+        far, sample = cover.nearest(points, FIRST, reach)
         near = np.flatnonzero(np.isfinite(far[:, 0]))
-        improve(near, self._owner[sample[near, 0]], far[near, 0])
+        improve(near, cover.owner[sample[near, 0]], far[near, 0])
         row, column = np.nonzero(np.isfinite(far[:, 1:]))
-        improve(row, self._owner[sample[row, column + 1]], far[row, column + 1])
+        improve(row, cover.owner[sample[row, column + 1]], far[row, column + 1])
         # No other triangle can be nearer than its nearest sample less the covering radius; where that leaves doubt,
         # all triangles with a sample in the ball of doubt are tried.
-        doubt = np.flatnonzero((far[:, -1] - self._radius < best) & np.isfinite(far[:, -1]))
+        doubt = np.flatnonzero((far[:, -1] - cover.most < best) & np.isfinite(far[:, -1]))
         for start in range(0, len(doubt), BATCH):
             at = doubt[start : start + BATCH]
-            row, sample = self._within(points[at], best[at] + self._radius)
-            off = points[at[row]] - self._samples[sample]
-            improve(at[row], self._owner[sample], np.sqrt(np.einsum("ij,ij->i", off, off)))
+            row, sample, far = cover.within(points[at], best[at] + cover.most)
+            improve(at[row], cover.owner[sample], far)
         found = np.flatnonzero(best <= reach)
         return self._contacts(len(points), found, best[found], triangle[found], weights[found])
-
-    def _nearest(self, points, count, reach):
-        """Distance (k, count) and index (k, count) of the samples nearest to points (k, 3), infinite beyond reach."""
-        count = min(count, self._tree.n)
-        far, sample = self._tree.query(points, k=count, distance_upper_bound=reach + self._radius)
-        return far.reshape(len(points), -1), sample.reshape(len(points), -1)
-
-    def _within(self, points, reach):
-        """Pairs of a point and a sample no farther than ``reach`` mm from it: (p,) and (p,)."""
-        lists = self._tree.query_ball_point(points, reach, return_sorted=False)
-        size = np.fromiter(map(len, lists), dtype=np.int64, count=len(lists))
-        flat = np.fromiter(chain.from_iterable(lists), dtype=np.int64, count=int(size.sum()))
-        return np.repeat(np.arange(len(lists)), size), flat
 
     def _once(self, row, owner):
         """Each pair of a point and a triangle once, in order."""
@@ -245,7 +250,7 @@ class Surface:
 
         def improve(row, owner, far):
             # What costs no less than the best so far even if it faced the same way needs no look.
-            some = np.flatnonzero(far - self._cover[owner] < best[row])
+            some = np.flatnonzero(far - cover.radius[owner] < best[row])
             row, owner = self._once(row[some], owner[some])
             w, d = self._solid.closest(points, row, owner)
             normal = np.einsum("kij,ki->kj", self.normals[self.triangles[owner]], w)
@@ -257,16 +262,16 @@ class Surface:
             at, pick = at[better], pick[better]
             best[at], triangle[at], weights[at], distance[at] = cost[pick], owner[pick], w[pick], d[pick]
 
-        first = min(FIRST, near)
-        far, sample = self._nearest(points, first, reach)
+        first, cover = min(FIRST, near), self._cover
+        far, sample = cover.nearest(points, first, reach)
         for columns in (slice(0, 2), slice(2, first)):
             row, column = np.nonzero(np.isfinite(far[:, columns]))
-            improve(row, self._owner[sample[:, columns][row, column]], far[:, columns][row, column])
-        doubt = np.flatnonzero((far[:, -1] - self._radius < best) & np.isfinite(far[:, -1]))
+            improve(row, cover.owner[sample[:, columns][row, column]], far[:, columns][row, column])
+        doubt = np.flatnonzero((far[:, -1] - cover.most < best) & np.isfinite(far[:, -1]))
         if near > first and len(doubt):
-            far, sample = self._nearest(points[doubt], near, reach)
+            far, sample = cover.nearest(points[doubt], near, reach)
             row, column = np.nonzero(np.isfinite(far))
-            improve(doubt[row], self._owner[sample[row, column]], far[row, column])
+            improve(doubt[row], cover.owner[sample[row, column]], far[row, column])
         at = np.flatnonzero(triangle >= 0)
         return self._contacts(len(points), at, distance[at], triangle[at], weights[at])
 
@@ -277,12 +282,13 @@ class Surface:
         directions (k, 3) unit vectors.
         """
         origins, directions = np.asarray(origins, dtype=float), np.asarray(directions, dtype=float)
-        step = max(2 * self._radius, reach / 16)
+        cover = self._cover
+        step = max(2 * cover.most, reach / 16)
         stations = np.arange(-reach, reach + step, step)
-        ball = float(np.hypot(step / 2, self._radius) + self._radius)
+        ball = float(np.hypot(step / 2, cover.most) + cover.most)
         at = (origins[:, None] + stations[None, :, None] * directions[:, None]).reshape(-1, 3)
-        station, sample = self._within(at, ball)
-        line, owner = self._once(station // len(stations), self._owner[sample])
+        station, sample, _ = cover.within(at, ball)
+        line, owner = self._once(station // len(stations), cover.owner[sample])
         a, ab = self.corners[owner, 0], self.corners[owner, 1] - self.corners[owner, 0]
         ac, d, o = self.corners[owner, 2] - a, directions[line], origins[line]
         p = np.cross(d, ac)

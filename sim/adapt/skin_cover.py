@@ -8,7 +8,8 @@ from ..anatomy.inside import winding_number
 from ..mesh import Mesh, edges
 from ..mesh_subdivision import drawn
 from .bone import NEAR
-from .closest import Surface, spread
+from .closest import Surface
+from .cover import spread
 
 LARGE = 9.0  # mm: triangles of linings with a longer side are looked at more closely
 STEP = 3.0  # mm: the most that is asked of bone at once

@@ -104,13 +104,14 @@ def fit_skin(reference: Head, target: Surface, given: dict[str, np.ndarray]) -> 
     first = ThinPlateSpline.fit(np.concatenate([marks, skin.vertices[margin]]), aim, give)
     moved = first.transform(skin.vertices)
     target = facing_out(target, moved, outer)
+    data = target.coarser()
     # Landmarks that were not given are where the skin is now; data will move them.
     now = np.concatenate([rows @ moved, moved[margin]])
     aim[: len(names)] = np.where(known[:, None], goal, now[: len(names)])
     pairs = Pairs(now, aim, give, len(names))
     unseen = unseen_ears(reference, given)
     calm = refinable(reference, outer, rim | unseen)
-    work = refine(moved, calm, target, feature_triangles(reference, names), pairs)
+    work = refine(moved, calm, data, feature_triangles(reference, names), pairs)
     warps = None
     while warps is None:
         try:
@@ -133,7 +134,7 @@ def fit_skin(reference: Head, target: Surface, given: dict[str, np.ndarray]) -> 
         np.concatenate([weight, np.full(len(margin), HOLD), together.weight]),
     )
     start = undrawn(skin.faces, moved + (whole.skin.vertices - skin.vertices) @ matrix.T, moved)
-    work = fine_fit(start, skin.faces, free, target, anchors, stiffness)
+    work = fine_fit(start, skin.faces, free, data, anchors, stiffness)
     fitted = None
     while fitted is None:
         try:

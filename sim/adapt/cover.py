@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Triangles covered by sample points of about equal spacing, kept in one k-d tree."""
+
+from itertools import chain
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+SAMPLES = 160_000  # a finer cover does not pay for the time its tree takes
+FEW = 30_000  # triangles; finer than they are where there are no more: less to try for each query
+
+
+class Cover:
+    """Samples of triangles (m, 3, 3) mm of areas (m,) mm², and how far from its samples a triangle may reach.
+
+    owner (s,) : the triangle of each sample; radius (m,) mm : no point of a triangle is farther from the nearest of its
+    samples; most : the largest of these
+    """
+
+    def __init__(self, corners: np.ndarray, area: np.ndarray):
+        usual = max(float(np.median(np.sqrt(2 * area))), 1e-6)
+        samples, self.owner, self.radius = spread(corners, usual * (0.55 if len(corners) < FEW else 0.75))
+        self.most = float(self.radius.max())
+        self._tree = cKDTree(samples)
+
+    def nearest(self, points, count, reach):
+        """Distance (k, c) mm and index (k, c) of the ``count`` samples nearest to points (k, 3).
+
+        Infinite where no triangle within ``reach`` mm has another.
+        """
+        count = min(count, self._tree.n)
+        far, sample = self._tree.query(points, k=count, distance_upper_bound=reach + self.most)
+        return far.reshape(len(points), -1), sample.reshape(len(points), -1)
+
+    def within(self, points, reach):
+        """Pairs of a point and a sample no farther than ``reach`` mm from it: (p,), (p,) and their distance (p,) mm."""
+        lists = self._tree.query_ball_point(points, reach, return_sorted=False)
+        size = np.fromiter(map(len, lists), dtype=np.int64, count=len(lists))
+        sample = np.fromiter(chain.from_iterable(lists), dtype=np.int64, count=int(size.sum()))
+        row = np.repeat(np.arange(len(lists)), size)
+        off = points[row] - self._tree.data[sample]
+        return row, sample, np.sqrt(np.einsum("ij,ij->i", off, off))
+
+
+def spread(corners: np.ndarray, spacing: float):
+    """Sample points over triangles (m, 3, 3) -> points (s, 3), owner (s,), covering radius (m,) in mm."""
+    middle = corners.mean(axis=1)
+    reach = np.sqrt(((corners - middle[:, None]) ** 2).sum(2).max(1))
+    parts = np.clip(np.ceil(reach / spacing), 1, 24).astype(int)
+    while (parts**2).sum() > max(SAMPLES, 2 * len(corners)):
+        spacing *= 1.2
+        parts = np.clip(np.ceil(reach / spacing), 1, 24).astype(int)
+    points, owner = [], []
+    for n in np.unique(parts):
+        of = np.flatnonzero(parts == n)
+        i, j = np.divmod(np.arange(n * n), n)
+        up = i + j < n
+        # Middles of the n*n small triangles: the upright ones, then those standing on their tip.
+        b = np.concatenate([(i[up] + 1 / 3) / n, (i[(i + j) < n - 1] + 2 / 3) / n])
+        c = np.concatenate([(j[up] + 1 / 3) / n, (j[(i + j) < n - 1] + 2 / 3) / n])
+        weights = np.stack([1 - b - c, b, c], axis=1)
+        points.append(np.einsum("sk,mkx->msx", weights, corners[of]).reshape(-1, 3))
+        owner.append(np.repeat(of, len(weights)))
+    return np.concatenate(points), np.concatenate(owner), reach / parts

@@ -1,0 +1,33 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The part of a scan that is looked at: all of an ordinary one, of a large one the head, no finer than its maps show."""
+
+import numpy as np
+
+from ..anatomy.head import Head
+from ..mesh import Mesh
+from .closest import Surface
+from .thin_plate_spline import similarity
+
+NORMALS = 2.0  # mm over which the scan's normals are averaged
+MOST = 600_000  # triangles of a scan that are all looked at: edges of about 0.7 mm on a head
+ROOM = 0.35  # of the head's size that is kept around it
+
+
+def scan_surface(reference: Head, scan: Mesh, given: dict[str, np.ndarray], most: int = MOST) -> Surface:
+    """The surface of ``scan`` (mm, any place) that the reference is fitted to.
+
+    given : name -> (3,) mm, landmarks that tell where the head is. A scan of more than ``most`` triangles is cut to the
+    head's neighbourhood, unless the landmarks lie elsewhere, and thinned (`Surface.coarser`).
+    """
+    triangles = scan.triangles
+    if len(triangles) <= most:
+        return Surface(scan.vertices, triangles, NORMALS)
+    rest = reference.landmark_positions()
+    names = [name for name in given if name in rest]
+    matrix, shift = similarity([rest[name] for name in names], [given[name] for name in names])
+    head = reference.skin.vertices @ matrix.T + shift
+    margin = ROOM * np.ptp(head, axis=0).max()
+    near = ((scan.vertices > head.min(axis=0) - margin) & (scan.vertices < head.max(axis=0) + margin)).all(axis=1)
+    kept = near[triangles].all(axis=1)
+    some = triangles[kept] if kept.sum() > most / 10 else triangles
+    return Surface(scan.vertices, some, NORMALS).coarser(most)
