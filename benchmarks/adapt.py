@@ -16,8 +16,9 @@ import time
 
 import numpy as np
 
-from headshop.sim.adapt.build import NORMALS, build_head
+from headshop.sim.adapt.build import build_head
 from headshop.sim.adapt.closest import Surface
+from headshop.sim.adapt.scan_surface import NORMALS
 from headshop.sim.adapt.skin_fit import fit_skin
 from headshop.sim.anatomy.storage import load_head
 from headshop.sim.progress import finish

@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..adapt.build import NORMALS
 from ..adapt.closest import Surface
+from ..adapt.scan_surface import NORMALS
 from ..anatomy.head import Head
 from ..anatomy.storage import load_head
 from ..errors import InputError
@@ -80,7 +80,7 @@ def find_landmarks(mesh: Mesh, reference: Head | None = None, unit_scales=(1.0,)
         yield Progress(0.1 + 0.4 * done, looking)
         poses = search_poses(samples * scale, template, TRIED)
         yield Progress(0.1 + 0.4 * (done + 0.5 / len(unit_scales)), looking)
-        target = Surface(mesh.vertices * scale, mesh.triangles, smooth=NORMALS)
+        target = Surface(mesh.vertices * scale, mesh.triangles, smooth=NORMALS).coarser()
         for pose in poses:
             facing = _facing(few, target, pose)
             try:
