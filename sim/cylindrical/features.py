@@ -8,12 +8,14 @@ around it, and springs between neighbouring features (step 7) weigh what is foun
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import gaussian_filter
 from scipy.spatial import cKDTree
 
 from ..adapt.completion import complete_positions
 from ..anatomy.head import Head
 from ..anatomy.landmark_names import SKIN, mirrored
-from ..progress import Progress, Work
+from ..mesh import Mesh
+from ..progress import Progress, Work, portion
 from .canonical import Canonical, canonical, drawn_skin, generic
 from .grid_mesh import to_mesh
 from .laplacian import second_differences
@@ -31,10 +33,14 @@ EAR_MARKS = {f"{n}_{s}" for n in ("t", "sa", "sba", "pra", "pa", "obs", "obi") f
 VAGUE = {"v", "op", "tr"} | {f"{n}_{s}" for n in ("eu", "ft", "zy", "go") for s in "lr"}
 #: How much of its spring ties a feature to its mirror image.
 TWIN = 0.1
+#: Texels within which features shift alike at first, and the likeness lost per texel squared of that shift.
+GROUP, FAR = 20.0, 0.0008
 #: Size of a generic feature arrangement that holds against stretching, mm.
 STIFF = 12.0
 #: How far the search and the expected place may be off, mm: see `_in_depth`.
 STRAY, DEEP = 1.5, 4.0
+#: Features of the midline that must lie between two others: the contours of lips and chin (steps 2 to 4).
+BETWEEN = (("sn", "sto", "sl"), ("sn", "ls", "sto"), ("sto", "li", "sl"), ("sl", "pg", "gn"))
 #: mm within which a feature that was carried over is put on the data.
 NEAR = 15.0
 
@@ -69,8 +75,13 @@ def find_features(range_map: RangeMap, reference: Head, pose: Pose | None = None
     """
     yield Progress(0.0, "Looking for the nose")
     pose = pose or find_pose(range_map, reference, within)
-    yield Progress(0.2, "Relaxing the voids")
-    maps, pattern = canonical(to_mesh(range_map), reference, pose), generic(reference)
+    return (yield from portion(search_features(to_mesh(range_map), reference, pose), 0.15, 1.0))
+
+
+def search_features(mesh: Mesh, reference: Head, pose: Pose) -> Work:
+    """Work returning the `Features` of the face of ``mesh`` (mm, turned any way), which is at ``pose`` or nearly so."""
+    yield Progress(0.0, "Relaxing the voids")
+    maps, pattern = canonical(mesh, reference, pose), generic(reference)
     at = reference.landmark_positions()
     names = tuple(name for name in SKIN if name in at)
     home = np.array([at[n] for n in names])
@@ -83,6 +94,7 @@ def find_features(range_map: RangeMap, reference: Head, pose: Pose | None = None
         pattern = canonical(drawn_skin(reference, lambda p, a=matrix, t=shift: p @ a.T + t), reference, pose)
         ahead = home @ matrix.T + shift
         places, void, sure = _search(maps, pattern, names, maps.full.texels(ahead), ahead, reach)
+    places = _in_order(maps, names, home, places)
     places, rows, columns = _carried(maps, at, names, places, sure, void)
     confidence = {n: float(c) * (0.3 if v else 1.0) for n, c, v in zip(names, sure, void, strict=True)}
     in_void = tuple(n for n, v in zip(names, void, strict=True) if v)
@@ -118,6 +130,22 @@ def _stretched(pose: Pose, home: np.ndarray, places: np.ndarray, sure: np.ndarra
         weight = sure / (1 + (off / 5.0) ** 2) ** 2
     matrix = start + change
     return matrix[:3].T, matrix[3] - matrix[:3].T @ centre
+
+
+def _in_order(maps: Canonical, names, home, places):
+    """Places (k, 3) with the middle of the lips and chin between what is above and below it, as on the generic head."""
+    rows, columns, _ = maps.full.texels(places)
+    at = {n: k for k, n in enumerate(names)}
+    for upper, middle, lower in BETWEEN:
+        a, b, c = at[upper], at[middle], at[lower]
+        share = (home[b, 2] - home[a, 2]) / (home[c, 2] - home[a, 2])
+        found = (rows[b] - rows[a]) / max(rows[c] - rows[a], 1e-6)
+        if not 0.1 < found < 0.9:
+            rows[b] = rows[a] + share * (rows[c] - rows[a])
+            columns[b] = columns[a] + share * (columns[c] - columns[a])
+            places = places.copy()
+            places[b] = maps.full.place(rows[b], columns[b])
+    return places
 
 
 def _carried(maps: Canonical, home: dict, names, places, sure, void):
@@ -219,7 +247,11 @@ def _settle(names, rows, columns, score, sweeps: int = 24):
     reach = score.shape[1] // 2
     d = np.arange(-reach, reach + 1)
     di, dj = np.meshgrid(d, d, indexing="ij")
-    move = np.zeros((len(names), 2))
+    # To begin with, where each feature and its neighbours together look best when all are shifted alike.
+    among = np.exp(-0.5 * (apart / GROUP) ** 2) * strength[None]
+    together = np.einsum("kj,jxy->kxy", among / among.sum(axis=1, keepdims=True), gaussian_filter(score, (0, 1.5, 1.5)))
+    at = (together - FAR * (di**2 + dj**2)).reshape(len(names), -1).argmax(axis=1)
+    move = np.column_stack([di.ravel()[at], dj.ravel()[at]]).astype(float)
     best = np.zeros(len(names))
     for sweep in range(sweeps):
         tie = 0.02 * (0.1 ** (sweep / (sweeps - 1)))  # likeness lost per texel squared off the neighbours' mean
