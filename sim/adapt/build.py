@@ -17,7 +17,7 @@ from .bone import depth_under
 from .closest import Surface
 from .fit_sentence import fit_sentence, fitted_shares, invented
 from .follow import follow
-from .gate import check_against_scan, check_arrangement
+from .gate import check_against_scan, check_arrangement, check_likeness, check_on_surface
 from .landmarks import require_usable
 from .rest import BONES
 from .scan_surface import scan_surface
@@ -67,8 +67,10 @@ def build_head(reference: Head, scan: Mesh, landmarks: dict[str, np.ndarray], de
     target = scan_surface(reference, scan, given)
     check_against_scan(given, target)
     check_arrangement(reference.landmark_positions(), given)
+    check_on_surface(given, target)
     fit = yield from portion(fit_skin(reference, target, given), 0.1, 0.7)
     refuse_poor(fit_report(reference, fit, given))
+    check_likeness(reference, fit.cage, fit.fitted.fitted)
     followed = yield from portion(follow(fit.reference, fit.cage, fit.unseen), 0.7, 0.85)
     yield Progress(0.85, "Checking the anatomy")
     head = followed.head

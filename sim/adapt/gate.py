@@ -3,16 +3,26 @@
 
 import numpy as np
 
+from ..anatomy.head import Head
 from ..anatomy.landmark_names import label, mirrored
 from ..errors import InputError
 from ..mesh import Mesh
+from .arrangement import Faces, Likeness
 from .closest import Surface
-from .thin_plate_spline import similarity
+from .relief import face_likeness
 
 AWAY = 30.0  # mm: median distance from landmarks to scan above which they are not of one head
-ODD = 30.0  # mm on an adult head: a single landmark that far from where a face has it is a mistake
-UNLIKE = 14.0  # mm on an adult head: root mean square distance from any human arrangement
+BESIDE = (
+    2.5,
+    1.6,
+    4.0,
+)  # mm: a median above the first, or above the second with a quarter above the third, is another's
+ODD = 12.0  # mm: a single landmark that far from where all others expect it, and
+STRANGE = 6.0  # standard deviations of that expectation, is a mistake
+UNLIKE = 3.5  # variance of the whole arrangement relative to people's, above which it is no face
+GAIN = 12.0  # squared standard deviations that an exchange of names must save to count as a mistake
 SCALE = (0.45, 1.6)  # head size relative to the reference
+RELIEF = 0.65  # correlation of relief with the reference's; faces have 0.78 and more, a ball and an egg 0.6 and less
 
 
 def check_against_scan(landmarks: dict[str, np.ndarray], scan: Mesh | Surface) -> None:
@@ -28,15 +38,22 @@ def check_against_scan(landmarks: dict[str, np.ndarray], scan: Mesh | Surface) -
     surface = scan if isinstance(scan, Surface) else Surface(scan.vertices, scan.triangles)
     size = np.linalg.norm(np.ptp(points, axis=0))
     scan_size = np.linalg.norm(np.ptp(surface.vertices, axis=0))
-    for factor, unit in ((1000.0, "metres"), (10.0, "centimetres"), (25.4, "inches")):
-        # A face's landmarks span a quarter to all of the scan; the factor that makes it so names the unit.
-        if size * factor < 1.6 * scan_size and size < 0.06 * scan_size:
-            scaled = surface.closest(points * factor).distance
-            if np.median(scaled) < min(AWAY, np.median(surface.closest(points).distance)):
-                raise InputError(
-                    f"The landmarks span {size:.3g} mm and the scan {scan_size:.0f} mm, as if the landmarks were in "
-                    f"{unit}: multiply them by {factor:g}."
-                )
+    # A face's landmarks span a quarter to all of the scan; the factor that makes it so names the unit.
+    units = ((1000.0, "metres"), (10.0, "centimetres"), (25.4, "inches"))
+    if size < 0.12 * scan_size:
+        away, factor, unit = min((np.median(surface.closest(points * f).distance), f, unit) for f, unit in units)
+        if away < AWAY:
+            raise InputError(
+                f"The landmarks span {size:.3g} mm and the scan {scan_size:.0f} mm, as if the landmarks were in "
+                f"{unit}: multiply them by {factor:g}."
+            )
+    if size > 3 * scan_size:
+        away, factor, unit = min((f * np.median(surface.closest(points / f).distance), f, unit) for f, unit in units)
+        if away < AWAY:
+            raise InputError(
+                f"The landmarks span {size:.0f} mm and the scan {scan_size:.3g} mm, as if the scan were in {unit}: give "
+                f"the scan's unit, or multiply the scan by {factor:g}."
+            )
     if size < 0.02 * scan_size or size > 20 * scan_size:
         raise InputError(
             f"The landmarks span {size:.3g} mm and the scan {scan_size:.3g} mm: give both in the same units."
@@ -46,6 +63,27 @@ def check_against_scan(landmarks: dict[str, np.ndarray], scan: Mesh | Surface) -
         raise InputError(
             f"Half of the landmarks lie more than {distance:.0f} mm from the scan: give landmarks picked on this scan, "
             "in its own place, axes and units."
+        )
+
+
+def check_on_surface(landmarks: dict[str, np.ndarray], scan: Surface) -> None:
+    """Refuse landmarks that float above or sink below the scan (mm both): they are another head's.
+
+    Over a hole or beside an open side a landmark may hang in mid-air; those do not count.
+
+    Raises
+    ------
+    InputError : the landmarks lie beside the surface.
+    """
+    near = scan.closest(np.array(list(landmarks.values()), dtype=float))
+    over = near.distance[~near.border]
+    if len(over) < 4:
+        return
+    middle, upper = np.percentile(over, (50, 75))
+    if middle > BESIDE[0] or (middle > BESIDE[1] and upper > BESIDE[2]):
+        raise InputError(
+            f"A quarter of the landmarks lie {upper:.0f} mm or more beside the scan's surface, as if they were another "
+            "head's: give landmarks picked on this scan."
         )
 
 
@@ -61,58 +99,78 @@ def check_arrangement(reference: dict[str, np.ndarray], given: dict[str, np.ndar
     names = [n for n in given if n in reference]
     if len(names) < 4:
         return
-    p = np.array([reference[n] for n in names], dtype=float)
-    q = np.array([given[n] for n in names], dtype=float)
-
-    def misfit(target, mirror=False, weights=None):
-        a, t = similarity(p, target, weights, mirror=mirror)
-        scale = abs(np.linalg.det(a)) ** (1 / 3)
-        return np.linalg.norm(target - p @ a.T - t, axis=1) / max(scale, 1e-9), scale
-
-    residual, scale = misfit(q)
-    rms = _rms(residual)
-    if any(n.endswith("_l") and mirrored(n) in names for n in names):
-        swapped = np.array([given.get(mirrored(n), given[n]) for n in names], dtype=float)
-        turned = _rms(misfit(swapped)[0])
-        # All sides exchanged is a mirrored face: it fits with the sides put right.
-        if rms > 8.0 and turned < 0.5 * rms and turned < UNLIKE:
+    faces = Faces(reference, names)
+    places = np.array([given[n] for n in names], dtype=float)
+    found = faces.likeness(places)
+    _refuse_exchanged(faces, places, found)
+    if len(names) > 5:
+        worst = int(np.argmax(found.strange))
+        away = float(np.linalg.norm(found.off[worst])) * found.scale
+        if found.strange[worst] > STRANGE and away > ODD:
             raise InputError(
-                "The landmarks' left and right are exchanged: _l is the subject's own left, so swap the names, or "
-                "mirror the scan if it is mirrored."
+                f'The landmark "{names[worst]}" ({label(names[worst])}) lies {away:.0f} mm from where the others expect '
+                "it: place it again or leave it out."
             )
-        for k, name in enumerate(names):
-            other = mirrored(name)
-            if name.endswith("_l") and other in names and rms > 3.0:
-                trial = q.copy()
-                j = names.index(other)
-                trial[[k, j]] = q[[j, k]]
-                if _rms(misfit(trial)[0]) < 0.6 * rms:
-                    raise InputError(f'The landmarks "{name}" and "{other}" are exchanged: swap their places.')
-    elif rms > 8.0 and _rms(misfit(q, mirror=True)[0]) < 0.5 * rms:
-        raise InputError("The landmarks are those of a mirrored face: mirror the scan, or exchange _l and _r.")
-    if len(names) > 5:  # leave each out in turn, see whether the rest agrees with itself
-        k = int(residual.argmax())
-        weights = np.ones(len(names))
-        weights[k] = 1e-9
-        without, _ = misfit(q, weights=weights)
-        others = np.delete(without, k)
-        if without[k] > ODD and without[k] > 4 * _rms(others):
-            raise InputError(
-                f'The landmark "{names[k]}" ({label(names[k])}) lies {without[k] * scale:.0f} mm from where the others '
-                "expect it: place it again or leave it out."
-            )
-    if rms > UNLIKE:
-        worst = names[int(residual.argmax())]
+    if found.energy > UNLIKE * 3 * len(names):
+        worst = names[int(np.argmax(found.strange))]
         raise InputError(
-            f'The landmarks do not form a face ({rms:.0f} mm from any likeness, worst "{worst}"): check their names '
-            "and places against the scan."
+            f'The landmarks do not form a face (the least likely is "{worst}", {label(worst)}): check their names and '
+            "places against the scan."
         )
-    if not SCALE[0] < scale < SCALE[1]:
+    if not SCALE[0] < found.scale < SCALE[1]:
         raise InputError(
-            f"The landmarks make a head {scale:.2g} times the size of an adult's: check the units of scan and "
+            f"The landmarks make a head {found.scale:.2g} times the size of an adult's: check the units of scan and "
             "landmarks."
         )
 
 
-def _rms(x):
-    return float(np.sqrt(np.mean(np.square(x))))
+def _refuse_exchanged(faces: Faces, places: np.ndarray, found: Likeness) -> None:
+    """Refuse landmarks that form a far likelier face with names exchanged: all sides, some pairs, or two that stand
+    out."""
+    names = faces.names
+    order = np.array([names.index(mirrored(n)) if mirrored(n) in names else k for k, n in enumerate(names)])
+    pairs = [(k, int(j)) for k, j in enumerate(order) if names[k].endswith("_l") and j != k]
+    if not pairs and faces.likeness(places * [-1.0, 1.0, 1.0]).energy < found.energy - 4 * GAIN:
+        raise InputError("The landmarks are those of a mirrored face: mirror the scan, or exchange _l and _r.")
+    enough = min(0.5 * found.energy, found.energy - GAIN, UNLIKE * 3 * len(names))
+    if pairs and faces.likeness(places[order]).energy < enough:
+        raise InputError(
+            "The landmarks' left and right are exchanged: _l is the subject's own left, so swap the names, or mirror "
+            "the scan if it is mirrored."
+        )
+    odd = [int(k) for k in np.argsort(-found.strange)[:4]]
+    trials = pairs + [(i, j) for i in odd for j in odd if i < j and (i, j) not in pairs and (j, i) not in pairs]
+    places, energy, exchanged = places.copy(), found.energy, []
+    while trials:
+        costs = []
+        for i, j in trials:
+            other = places.copy()
+            other[[i, j]] = other[[j, i]]
+            costs.append(faces.likeness(other).energy)
+        best = int(np.argmin(costs))
+        if costs[best] > energy - GAIN or costs[best] > 0.9 * energy:
+            break
+        i, j = trials.pop(best)
+        places[[i, j]] = places[[j, i]]
+        energy = costs[best]
+        exchanged.append(f'"{names[i]}" and "{names[j]}"')
+    if exchanged and energy < UNLIKE * 3 * len(names):
+        said = exchanged[0] if len(exchanged) == 1 else ", ".join(exchanged[:-1]) + " and also " + exchanged[-1]
+        where = "their places" if len(exchanged) == 1 else "the places of each pair"
+        raise InputError(f"The landmarks {said} are exchanged: swap {where}.")
+
+
+def check_likeness(reference: Head, vertices: np.ndarray, fitted: np.ndarray) -> None:
+    """Refuse a fitted skin (n, 3) without the relief of a face: the scan shows something else where the landmarks are.
+
+    fitted (n,) 0..1 : how far the scan decided
+
+    Raises
+    ------
+    InputError : no nose, sockets and lips in the scan.
+    """
+    if face_likeness(reference, vertices, fitted) < RELIEF:
+        raise InputError(
+            "The scan shows no face where the landmarks say it is: check that landmarks and scan belong together, or "
+            "choose the scan of a face."
+        )

@@ -1,0 +1,165 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The gate on people: no landmarks of their own are refused, every kind of mistake is, in its own words."""
+
+import numpy as np
+import pytest
+
+from headshop.sim.adapt.arrangement import Faces
+from headshop.sim.adapt.closest import Surface
+from headshop.sim.adapt.gate import check_against_scan, check_arrangement, check_likeness, check_on_surface
+from headshop.sim.adapt.landmarks import read_landmarks
+from headshop.sim.adapt.relief import face_likeness
+from headshop.sim.anatomy.landmark_names import SKIN, mirrored
+from headshop.sim.errors import InputError
+from headshop.sim.mesh_subdivision import drawn
+from headshop.sim.scan.clean import clean_scan
+from headshop.sim.scan.ply import read_ply
+
+TWELVE = "ex_l ex_r en_l en_r prn sn ch_l ch_r gn n t_l t_r".split()
+SCANS = ("lps_infinite", "menpo_james", "fran_cyberware", "rvcg_dummyhead")
+
+
+@pytest.fixture(scope="module")
+def people(shared):
+    """Name -> (surface of the scan, its landmarks)."""
+    out = {}
+    for name in SCANS:
+        scan, _ = clean_scan(read_ply(shared / "scans" / f"{name}.ply"))
+        marks = read_landmarks(shared / "scans" / f"{name}.landmarks.json")
+        out[name] = Surface(scan.vertices, scan.triangles), marks
+    return out
+
+
+def _check(reference, surface, marks):
+    check_against_scan(marks, surface)
+    check_arrangement(reference.landmark_positions(), marks)
+    check_on_surface(marks, surface)
+
+
+def _refusal(act, *arguments) -> str:
+    with pytest.raises(InputError) as refusal:
+        act(*arguments)
+    sentence = str(refusal.value)
+    assert "\n" not in sentence and sentence.endswith(".") and sentence.count(". ") == 0
+    return sentence
+
+
+@pytest.mark.parametrize("few", [SKIN, TWELVE, ("ex_l", "ex_r", "prn", "gn")])
+def test_their_own_landmarks_pass(people, reference, few):
+    for surface, marks in people.values():
+        _check(reference, surface, {n: p for n, p in marks.items() if n in few})
+
+
+@pytest.mark.parametrize("few", [SKIN, TWELVE])
+def test_those_of_another_head_do_not(people, reference, few):
+    caught = {}
+    for mine, (surface, _) in people.items():
+        for whose, (_, marks) in people.items():
+            if mine != whose:
+                try:
+                    _check(reference, surface, {n: p for n, p in marks.items() if n in few})
+                except InputError as error:
+                    caught[mine, whose] = str(error)
+    assert len(caught) >= (10 if few is SKIN else 8), "of twelve: all four lie in one place, and some are alike"
+    assert sum("another head" in sentence for sentence in caught.values()) > 6
+
+
+@pytest.mark.parametrize("name", SCANS)
+def test_exchanged_sides_and_pairs_are_named(people, reference, name):
+    """All sides, and every single pair."""
+    rest, marks = reference.landmark_positions(), people[name][1]
+    swapped = {mirrored(n) if mirrored(n) in marks else n: p for n, p in marks.items()}
+    assert "left and right are exchanged" in _refusal(check_arrangement, rest, swapped)
+    pairs = [(n, mirrored(n)) for n in marks if n.endswith("_l") and mirrored(n) in marks]
+    for left, right in pairs[:: max(len(pairs) // 6, 1)]:
+        said = _refusal(check_arrangement, rest, marks | {left: marks[right], right: marks[left]})
+        assert f'"{left}" and "{right}" are exchanged' in said
+
+
+def test_several_exchanges_are_all_named(people, reference):
+    marks = people["lps_infinite"][1]
+    wrong = marks | {"ex_l": marks["ex_r"], "ex_r": marks["ex_l"], "ls": marks["gn"], "gn": marks["ls"]}
+    said = _refusal(check_arrangement, reference.landmark_positions(), wrong)
+    assert '"ex_l" and "ex_r"' in said and ('"ls" and "gn"' in said or '"gn" and "ls"' in said)
+
+
+def test_a_landmark_far_off_is_named(people, reference):
+    rest = reference.landmark_positions()
+    rng = np.random.default_rng(5)
+    for few in (SKIN, TWELVE):
+        for _, marks in people.values():
+            given = {n: p for n, p in marks.items() if n in few}
+            for name in [n for n in ("ex_l", "prn", "ch_r", "sn", "n") if n in given]:
+                off = rng.normal(size=3)
+                wrong = given | {name: given[name] + 55 * off / np.linalg.norm(off)}
+                assert f'"{name}"' in _refusal(check_arrangement, rest, wrong)
+
+
+@pytest.mark.parametrize(("factor", "unit"), [(1000.0, "metres"), (10.0, "centimetres"), (25.4, "inches")])
+def test_wrong_units_are_named(people, reference, factor, unit):
+    surface, marks = people["lps_infinite"]
+    said = _refusal(check_against_scan, {n: p / factor for n, p in marks.items()}, surface)
+    assert f"landmarks were in {unit}" in said and f"{factor:g}" in said
+    small = Surface(surface.vertices / factor, surface.triangles)
+    said = _refusal(check_against_scan, marks, small)
+    assert f"scan were in {unit}" in said
+
+
+def test_upside_down_is_refused(people, reference):
+    """The landmarks of a scan that was turned afterwards."""
+    turn = np.diag([-1.0, 1.0, -1.0])
+    for surface, marks in people.values():
+        centre = surface.vertices.mean(axis=0)
+        turned = {n: turn @ (p - centre) + centre for n, p in marks.items()}
+        _refusal(_check, reference, surface, turned)
+
+
+def test_mid_air_is_legal(people, reference):
+    """Landmarks over holes: everything around four of them is cut away."""
+    surface, marks = people["lps_infinite"]
+    gone = np.zeros(len(surface.vertices), dtype=bool)
+    for name in ("ch_l", "zy_l", "al_l", "gn"):
+        gone |= np.linalg.norm(surface.vertices - marks[name], axis=1) < 18
+    holed = Surface(surface.vertices, surface.triangles[~gone[surface.triangles].any(axis=1)])
+    _check(reference, holed, marks)
+
+
+def test_stretched_faces_pass_in_any_pose_and_size(reference):
+    """Broader, longer, flatter faces, each landmark moved by the millimetres by which they are picked."""
+    rest = reference.landmark_positions()
+    faces = Faces(rest, list(rest))
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        places = np.array(list(rest.values())) * rng.uniform(0.9, 1.1, 3) * rng.uniform(0.85, 1.15)
+        places += rng.normal(0, 1.5, places.shape)
+        turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+        turn *= np.sign(np.linalg.det(turn))
+        moved = places @ turn.T + rng.normal(0, 300, 3)
+        check_arrangement(rest, dict(zip(rest, moved, strict=True)))
+        here, there = faces.likeness(places), faces.likeness(moved)
+        np.testing.assert_allclose(there.strange, here.strange, rtol=1e-3, atol=1e-3)
+
+
+def test_leaving_one_out_is_what_the_others_predict(reference):
+    """The closed form against the same field without that landmark."""
+    rest = reference.landmark_positions()
+    rng = np.random.default_rng(3)
+    given = {n: p + rng.normal(0, 3, 3) for n, p in rest.items() if n in TWELVE}
+    places = np.array(list(given.values()))
+    whole = Faces(rest, list(given)).likeness(places)
+    lifted = places.copy()
+    lifted[3] += [40.0, 0.0, 0.0]
+    moved = Faces(rest, list(given)).likeness(lifted)
+    # The others say the same whatever the one does, apart from the pose about which all is taken as linear.
+    np.testing.assert_allclose(np.linalg.norm(moved.off[3] - whole.off[3]), 40, atol=4)
+
+
+def test_a_ball_is_no_face(reference):
+    skin = reference.skin
+    fitted = np.ones(len(skin.vertices))
+    assert face_likeness(reference, skin.vertices, fitted) > 0.999
+    bent = skin.vertices * [1.1, 0.95, 1.05] + 2 * np.sin(skin.vertices[:, [1, 2, 0]] / 30)
+    check_likeness(reference, drawn(skin.faces, bent), fitted)
+    ball = 95 * skin.vertices / np.linalg.norm(skin.vertices, axis=1, keepdims=True)
+    assert "no face" in _refusal(check_likeness, reference, ball, fitted)
+    assert np.isnan(face_likeness(reference, ball, np.zeros(len(fitted))))
