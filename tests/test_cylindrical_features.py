@@ -3,15 +3,18 @@
 
 import numpy as np
 import pytest
+from scipy.sparse import csr_matrix
 
 from headshop.sim.adapt.completion import sigma
+from headshop.sim.cylindrical.adaptation import adapt
 from headshop.sim.cylindrical.features import find_features
 from headshop.sim.cylindrical.laplacian import edge_field, laplacian_field
 from headshop.sim.cylindrical.pose import find_pose
 from headshop.sim.cylindrical.range_map import RangeMap, resample
 from headshop.sim.cylindrical.relaxation import filled, relaxed
+from headshop.sim.cylindrical.springs import relax
 from headshop.sim.errors import InputError
-from headshop.sim.mesh import Mesh
+from headshop.sim.mesh import Mesh, vertex_normals
 from headshop.sim.progress import finish
 
 
@@ -115,13 +118,19 @@ def test_the_pose_of_a_face_is_found_at_any_longitude(reference, person):
         assert angle < 7
 
 
-def test_features_are_found_with_a_hole_in_the_face(reference, person):
+@pytest.fixture(scope="module")
+def holed(reference, person):
+    """The person's map with a hole in the cheek, the true landmarks, and the features found."""
     mesh, marks, _ = person
-    made = resample(mesh)
+    made = resample(mesh, 384, 192)
     row, column, _ = made.texels(marks["zy_l"])
     made.valid[int(row) - 8 : int(row) + 8, int(column) - 8 : int(column) + 8] = False
     made.radius[~made.valid] = np.nan
-    found = finish(find_features(made, reference))
+    return made, marks, finish(find_features(made, reference))
+
+
+def test_features_are_found_with_a_hole_in_the_face(holed):
+    _, marks, found = holed
     off = {n: np.linalg.norm(found.positions[n] - p) for n, p in marks.items()}
     sharp = [n for n in off if sigma(n) < 2]
     assert np.mean([off[n] for n in sharp]) < 3.0
@@ -136,3 +145,41 @@ def test_features_are_found_with_a_hole_in_the_face(reference, person):
 def test_a_wall_has_no_nose(reference):
     with pytest.raises(InputError, match="nose"):
         find_pose(around(np.full((60, 128), 90.0)), reference)
+
+
+def test_the_ten_steps_lay_the_generic_head_on_the_map(reference, holed):
+    made, marks, found = holed
+    adapted = finish(adapt(made, reference, found))
+    assert adapted.error["mean"] < 0.6 and adapted.error["p95"] < 2.0 and adapted.error["coverage"] > 0.85
+    assert len(adapted.skin.vertices) == len(reference.skin.vertices)
+    assert 0.4 < adapted.sampled.mean() < 0.9 and np.isfinite(adapted.skin.vertices).all()
+    placed = reference.landmarks.on({"skin": adapted.skin.vertices})
+    sharp = [n for n in marks if sigma(n) < 2]
+    assert np.mean([np.linalg.norm(placed[n] - marks[n]) for n in sharp]) < 4.5
+    normals = vertex_normals(adapted.skin.vertices, adapted.skin.triangles)
+    front = (np.asarray(reference.groups["face"]) > 0.5) & adapted.sampled
+    out = adapted.skin.vertices - (adapted.map.origin + [0, 0, 1] * (adapted.skin.vertices - adapted.map.origin))
+    assert (np.einsum("ij,ij->i", normals, out)[front] > 0).mean() > 0.97  # no triangle turned over
+    # texture coordinates lead each corner to its own texel
+    h, w = adapted.map.shape
+    u, v = adapted.skin.uv[:, 0].T
+    corner = adapted.skin.vertices[adapted.skin.faces[:, 0]]
+    seen = adapted.sampled[adapted.skin.faces[:, 0]]
+    back = adapted.map.place((1 - v) * h - 0.5, u * w - 0.5)
+    assert np.median(np.linalg.norm(back - corner, axis=1)[seen]) < 0.3
+    assert np.ptp(adapted.skin.uv[seen][..., :3, 0], axis=1).max() < 0.5  # no face spans the whole picture
+
+
+def test_springs_at_rest_stay_and_pins_pull(reference):
+    side = np.arange(12.0)
+    flat = np.stack(np.meshgrid(10 * side, 5 * side), axis=-1).reshape(-1, 2)
+    corner = np.arange(144).reshape(12, 12)
+    links = np.concatenate([np.stack([corner, np.roll(corner, -1, axis=1)], axis=-1).reshape(-1, 2)])  # around
+    links = np.concatenate([links, np.stack([corner[:-1], corner[1:]], axis=-1).reshape(-1, 2)])
+    pins = csr_matrix(([1.0], ([0], [66])), shape=(1, 144))
+    still = relax(flat, links, pins, flat[[66]], np.array([10.0]), 120.0)
+    np.testing.assert_allclose(still, flat, atol=1e-3)
+    moved = relax(flat, links, pins, flat[[66]] + [4.0, -3.0], np.array([1e4]), 120.0)
+    np.testing.assert_allclose(moved[66], flat[66] + [4.0, -3.0], atol=0.05)
+    off = np.linalg.norm(moved - flat, axis=1)
+    assert off[66] == off.max() and off[65] > 0.5 and np.isfinite(off).all()

@@ -1,13 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Cylindrical range maps of meshes, and meshes of maps."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
 from headshop.sim.adapt.closest import Surface
 from headshop.sim.cylindrical.grid_mesh import to_mesh
 from headshop.sim.cylindrical.range_map import resample
+from headshop.sim.cylindrical.unroll import unrolled
 from headshop.sim.mesh import Mesh, vertex_normals
+from headshop.sim.scan.ply import read_ply
 
 
 def tent(levels=5):
@@ -95,3 +100,28 @@ def test_holes_and_jumps_of_a_map_are_holes_of_the_mesh():
     torn = to_mesh(made.__class__(**{**vars(made), "radius": step}))
     assert len(torn.faces) < len(holed.faces) - 20
     assert len(to_mesh(made.__class__(**{**vars(made), "radius": step}), tear=None).faces) == len(holed.faces)
+
+
+def test_an_unrolled_map_is_recovered_and_other_meshes_are_none(reference):
+    rng = np.random.default_rng(2)
+    made = replace(resample(tent(3), 90, 40, origin=[1.0, 2, 3], span=(-50, 60)), first=-0.6, step=0.03)
+    tilt, _ = np.linalg.qr(np.eye(3) + 0.05 * rng.normal(size=(3, 3)))
+    made = made.moved(tilt * np.sign(np.diag(tilt)), [4, 5, 6])
+    mesh = to_mesh(made, tear=None)
+    again = unrolled(mesh)
+    assert again.shape == made.shape and not again.closed
+    np.testing.assert_allclose(again.points(), made.points(), atol=1e-6)
+    np.testing.assert_allclose(again.colour, made.colour, atol=1e-6)
+    np.testing.assert_allclose([again.step, again.rise], [made.step, made.rise], rtol=1e-6)
+    assert unrolled(reference.skin) is None
+    assert unrolled(mesh.moved(mesh.vertices + rng.normal(scale=0.1, size=mesh.vertices.shape))) is None
+
+
+def test_a_scanners_patch_gives_back_its_own_map(shared):
+    mesh = read_ply(shared / "scans" / "fran_cyberware.ply")
+    made = unrolled(mesh)
+    assert made.shape == (49, 45) and made.valid.all()
+    assert 2 * np.pi / made.step == pytest.approx(512 / 3, rel=1e-3)  # every third longitude of 512
+    assert made.rise == pytest.approx(3.2, abs=1e-3)
+    near = cKDTree(mesh.vertices).query(made.points().reshape(-1, 3))[0]
+    assert near.max() < 1e-3

@@ -90,7 +90,7 @@ def search_features(mesh: Mesh, reference: Head, pose: Pose) -> Work:
     for reach in REACHES[1:]:
         yield Progress(0.7, "Looking again")
         # the generic head made like the subject as far as it is known by now: what is left to find is less
-        matrix, shift = _stretched(pose, home, places, sure)
+        matrix, shift = stretched(pose, home, places, sure)
         pattern = canonical(drawn_skin(reference, lambda p, a=matrix, t=shift: p @ a.T + t), reference, pose)
         ahead = home @ matrix.T + shift
         places, void, sure = _search(maps, pattern, names, maps.full.texels(ahead), ahead, reach)
@@ -112,7 +112,7 @@ def _search(maps: Canonical, pattern: Canonical, names, texels, ahead, reach):
     return places, void, np.where(told, sure, 0.1)
 
 
-def _stretched(pose: Pose, home: np.ndarray, places: np.ndarray, sure: np.ndarray):
+def stretched(pose: Pose, home: np.ndarray, places: np.ndarray, sure: np.ndarray):
     """The affine map from the generic head to the scan that agrees with the features found: (3, 3) and (3,).
 
     Heads differ in height, width and depth; more than that is not asked of what was found, lest a feature in the wrong
