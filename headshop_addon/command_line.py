@@ -14,6 +14,7 @@ from contextlib import contextmanager
 from ..sim.errors import InputError
 
 INTERRUPTED = 130
+RELAX = ("auto", "always", "never")
 SETS = ("muscles", "facs", "arkit", "expressions")
 
 
@@ -55,6 +56,8 @@ def parser() -> argparse.ArgumentParser:
     about = "pixels along a side of the displacement and normal map, 0 for none (default: 1024)"
     build.add_argument("--detail", type=int, choices=sizes, default=1024, metavar="SIZE", help=about)
     build.add_argument("--name", help="what to call the head (default: the scan's name)")
+    relax = "make the face neutral: auto (where the lips are parted; the default), always or never"
+    build.add_argument("--relax", choices=RELAX, default="auto", metavar="WHEN", help=relax)
     build.add_argument("-o", "--output", required=True, metavar="HEAD.blend")
 
     landmarks = command("landmarks", "Find the landmarks of a scan.", reading)

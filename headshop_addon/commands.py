@@ -37,11 +37,12 @@ def build(options) -> None:
         from . import pipeline
 
         name = options.name or Path(options.scan).stem
+        wanted = {"detail": options.detail, "relax": options.relax}
         if landmarks is None:
-            work = pipeline.build_alone(options.scan, name, options.units, options.up, options.detail)
+            work = pipeline.build_alone(options.scan, name, options.units, options.up, **wanted)
         else:
             scan = pipeline.load_scan(options.scan, landmarks, options.units, options.up)
-            work = pipeline.build(scan, scan.orientation.turn(landmarks), name, detail=options.detail)
+            work = pipeline.build(scan, scan.orientation.turn(landmarks), name, **wanted)
         skin, report = _run(work, options)
         _set_stage(skin)
         _save(blend)

@@ -15,7 +15,7 @@ from ..sim.mesh import Mesh
 from ..sim.progress import Progress, Work, portion
 from ..sim.scan.clean import clean_scan
 from ..sim.scan.orientation import Orientation, detect, plausible_units
-from . import bridge, heads
+from . import bridge, heads, shape_keys
 from .detail_images import write_images
 from .materials import dressing
 from .provenance import timed, versions
@@ -110,11 +110,13 @@ def build(
     scan_object: bpy.types.Object | None = None,
     scene: bpy.types.Scene | None = None,
     detail: int = SIZE,
+    relax: str = "auto",
 ) -> Work:
     """Fit the reference head to ``scan`` and put it into the scene; returns (skin object, report).
 
-    ``landmarks`` are in the scan's place (mm); ``detail`` is the side of the detail maps in pixels, 0 for none. Closing
-    the generator leaves the scene as it was.
+    ``landmarks`` are in the scan's place (mm); ``detail`` is the side of the detail maps in pixels, 0 for none.
+    ``relax`` is one of `sim.relax.choice.CHOICES`; a face that is relaxed keeps itself as scanned in a shape key.
+    Closing the generator leaves the scene as it was.
 
     Raises
     ------
@@ -124,7 +126,7 @@ def build(
     with timed(seconds, "fit"):
         yield Progress(0.0, "Reading the reference head")
         reference = load_head()
-        result = yield from portion(build_head(reference, scan.mesh, landmarks, detail), 0.02, 0.9)
+        result = yield from portion(build_head(reference, scan.mesh, landmarks, detail, relax), 0.02, 0.9)
     yield Progress(0.9, "Placing the head")
     report = {
         "scan": scan.report,
@@ -143,6 +145,8 @@ def build(
             (scene or bpy.context.scene).collection.objects.unlink(scan_object)
             scan_object.hide_viewport = True
         skin = next(obj for obj in collection.objects if heads.is_skin(obj))
+        if result.scanned is not None:
+            shape_keys.keep_as_scanned(skin, result.scanned)
         if result.detail is not None:
             yield Progress(0.92, "Packing the detail maps")
             write_images(skin, result.detail)
@@ -151,15 +155,16 @@ def build(
     return skin, report
 
 
-def build_alone(path, name: str, unit: str | None = None, up: str | None = None, detail: int = SIZE) -> Work:
-    """A scan file to a head without anybody's landmarks; returns what `build` does.
+def build_alone(path, name: str, unit: str | None = None, up: str | None = None, **options) -> Work:
+    """A scan file to a head without anybody's landmarks; returns what `build` does, to which further
+    ``options`` go.
 
     Raises
     ------
     InputError : the file cannot be read, is no head, or shows no face.
     """
     scan, found = yield from portion(load_scan_alone(path, unit, up), 0.0, 0.35)
-    skin, report = yield from portion(build(scan, found.sure(), name, detail=detail), 0.35, 1.0)
+    skin, report = yield from portion(build(scan, found.sure(), name, **options), 0.35, 1.0)
     return skin, report
 
 

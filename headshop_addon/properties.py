@@ -36,6 +36,14 @@ DETAIL = (
 )
 
 
+#: Which faces are relaxed when a head is built.
+RELAX = (
+    ("AUTO", "Parted Lips", "Relax a face whose lips are parted"),
+    ("ALWAYS", "Always", "Relax any face, one that smiles with closed lips too"),
+    ("NEVER", "Never", "Keep the face as scanned"),
+)
+
+
 def _on_detail(group, _context):
     detail_images.show(group.id_data, group.detail)
 
@@ -151,6 +159,11 @@ class HEADSHOP_PG_scene(bpy.types.PropertyGroup):
         name="Head", description="The head that sliders and bakes work on", type=bpy.types.Object, poll=_is_skin
     )
     show_landmarks: BoolProperty(name="Show Landmarks", description="Draw landmarks in the viewport", default=True)
+    relax: EnumProperty(
+        name="Relax",
+        description="When to make the scanned face neutral; the face as scanned is kept as the shape key Scan",
+        items=RELAX,
+    )
     show_names: BoolProperty(name="Names", description="Write each placed landmark's name beside it", default=True)
 
 

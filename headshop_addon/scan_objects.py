@@ -157,7 +157,12 @@ def build(context, scan: bpy.types.Object, name: str = "") -> Work:
     report = json.loads(scan.get(heads.REPORT, "{}")).get("scan", {})
     prepared = pipeline.Scan(bridge.object_to_mesh(scan), _upright(), report)
     skin, report = yield from pipeline.build(
-        prepared, placed, name or scan.name.removesuffix(" Scan"), scan, context.scene
+        prepared,
+        placed,
+        name or scan.name.removesuffix(" Scan"),
+        scan,
+        context.scene,
+        relax=context.scene.headshop.relax.lower(),
     )
     skin.matrix_world = scan.matrix_world
     scan.hide_viewport = True

@@ -20,6 +20,7 @@ from ..sim.tissue.solver import rest_state, solve
 from . import bridge, heads
 
 SHAPES = "headshop_shapes"
+SCANNED = "Scan"  # the face with the expression that it was scanned with, if that was taken away
 ITERATIONS = 200  # until it rests, not until it looks right
 STILL = 0.001  # mm: a part that moves less gets no key
 
@@ -61,6 +62,12 @@ def _report(solution, delta: np.ndarray) -> dict:
         "penetration_mm": round(float(found["penetration_mm"]), 4),
         "converged": bool(solution.converged),
     }
+
+
+def keep_as_scanned(skin: bpy.types.Object, vertices: np.ndarray) -> None:
+    """Keep the skin's vertices (n, 3) mm as scanned in a shape key of value 0, which no bake touches."""
+    bridge.ensure_shape_key(skin, SCANNED)
+    bridge.write_positions(skin, vertices, SCANNED)
 
 
 def require_editable(skin: bpy.types.Object) -> None:

@@ -20,6 +20,7 @@ class HEADSHOP_PT_build(SidebarPanel, bpy.types.Panel):
         layout = self.layout
         if progress(layout, "build"):
             return
+        layout.prop(context.scene.headshop, "relax")
         row = layout.row()
         row.scale_y = 1.4
         row.operator("headshop.build_head", icon="USER")
@@ -45,6 +46,12 @@ def _result(layout, context, skin):
             side = row.row()
             side.alignment = "RIGHT"
             side.label(text=f"{fit[key]:.2f} mm")
+    if fit.get("relaxed"):
+        row = box.row()
+        row.label(text="Relaxed, jaw closed by")
+        side = row.row()
+        side.alignment = "RIGHT"
+        side.label(text=f"{fit['relaxed']['jaw_degrees']:.1f}\N{DEGREE SIGN}")
     if "sentence" in fit:
         hint(layout, context, fit["sentence"], "CHECKMARK")
     _show(layout, skin)

@@ -13,6 +13,7 @@ from ..errors import InputError
 from ..mesh import Mesh
 from ..mesh_subdivision import drawn, smoother
 from ..progress import Progress, Work, portion
+from ..relax.choice import require_choice, to_be_followed
 from .bone import depth_under
 from .closest import Surface
 from .fit_sentence import fit_sentence, fitted_shares, invented
@@ -42,6 +43,7 @@ class BuildResult:
     attributes : per skin vertex (n,) float32: ``fitted`` 0..1 (0: invented by the warp), ``distance_mm`` to the scan
         (positive outside, NaN where there is no data)
     detail : displacement and normal map of what is finer than the mesh; None if not asked for
+    scanned : (n, 3) mm, the head's skin with the expression that it was scanned with; None where it was not relaxed
     """
 
     head: Head
@@ -50,12 +52,17 @@ class BuildResult:
     landmarks_missing: tuple[str, ...]
     attributes: dict[str, np.ndarray] = field(default_factory=dict)
     detail: DetailMaps | None = None
+    scanned: np.ndarray | None = None
 
 
-def build_head(reference: Head, scan: Mesh, landmarks: dict[str, np.ndarray], detail: int = SIZE) -> Work:
+def build_head(
+    reference: Head, scan: Mesh, landmarks: dict[str, np.ndarray], detail: int = SIZE, relax: str = "auto"
+) -> Work:
     """Work returning the `BuildResult` for a scan (mm, any place) with four or more ``landmarks`` (name -> mm).
 
     detail : texels along a side of the detail maps; 0 for none
+    relax : ``auto`` makes a face neutral whose lips are parted (`sim.relax`), ``always`` any, ``never`` none. The figures
+        in ``fit`` are those of the face as scanned.
 
     Raises
     ------
@@ -63,6 +70,7 @@ def build_head(reference: Head, scan: Mesh, landmarks: dict[str, np.ndarray], de
     """
     given = {n: np.asarray(p, dtype=float) for n, p in landmarks.items() if n in SKIN}
     require_usable(given, "The landmark set")
+    require_choice(relax)
     yield Progress(0.0, "Looking at the scan")
     target = scan_surface(reference, scan, given)
     check_against_scan(given, target)
@@ -70,13 +78,18 @@ def build_head(reference: Head, scan: Mesh, landmarks: dict[str, np.ndarray], de
     check_on_surface(given, target)
     fit = yield from portion(fit_skin(reference, target, given), 0.1, 0.7)
     refuse_poor(fit_report(reference, fit, given))
-    check_likeness(reference, fit.cage, fit.fitted.fitted)
-    followed = yield from portion(follow(fit.reference, fit.cage, fit.unseen), 0.7, 0.85)
+    check_likeness(fit.reference, fit.cage, fit.fitted.fitted)
+    yield Progress(0.68, "Relaxing the face")
+    base, neutral = to_be_followed(fit, relax)
+    skin = fit.cage if neutral is None else neutral.skin
+    followed = yield from portion(follow(base, skin, fit.unseen), 0.7, 0.85)
     yield Progress(0.85, "Checking the anatomy")
     head = followed.head
-    report = fit_report(reference, fit, given, head.skin.vertices)
+    scanned = head.skin.vertices + (fit.cage - skin)
+    report = fit_report(reference, fit, given, scanned)
     report["invented"] = invented(fitted_shares(head, fit.fitted.fitted))
     report["sentence"] = fit_sentence(report, report["invented"])
+    report["relaxed"] = None if neutral is None else neutral.report
     anatomy = anatomy_report(head)
     missing = tuple(n for n in SKIN if n not in given)
     attributes = {
@@ -85,9 +98,11 @@ def build_head(reference: Head, scan: Mesh, landmarks: dict[str, np.ndarray], de
     }
     maps = None
     if detail and head.skin.uv is not None:
-        maps = yield from portion(detail_maps(head.skin, fit.target, group(head, "inner"), detail), 0.88, 1.0)
+        maps = yield from portion(
+            detail_maps(head.skin.moved(scanned), fit.target, group(head, "inner"), detail), 0.88, 1.0
+        )
         report["detail"] = maps.report
-    return BuildResult(head, report, anatomy, missing, attributes, maps)
+    return BuildResult(head, report, anatomy, missing, attributes, maps, None if neutral is None else scanned)
 
 
 def fit_report(reference: Head, fit: SkinFit, given, cage=None) -> dict:

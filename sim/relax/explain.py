@@ -18,10 +18,14 @@ from scipy.linalg import cho_factor, cho_solve, solve_triangular
 from scipy.optimize import nnls
 from scipy.spatial.distance import cdist
 
+from ..acting.expressions import expressions
 from .responses import Responses
 
 NOISE = 0.3  # mm
-USUAL = 0.5  # contraction of a muscle, and half the widest opening of the jaw: what shrinkage expects
+OPEN = 0.5  # opening of the jaw that shrinkage expects
+SMILE = 1.0  # strength of a smile, by the joy of the table of expressions, that it expects
+ALONE = 0.3  # contraction of a muscle beyond its share in the smile
+UNEVEN = 0.15  # difference between the sides
 #: What our muscles do otherwise than a person's: share of what they do, and its reach in mm.
 UNLIKE, REACH = 0.35, 16.0
 LEAST = 0.4  # mm of the same where little moves, at the mouth
@@ -61,6 +65,7 @@ def explain(table: Responses, vertices, sampling, offsets, people, names=None, n
     places = sampling @ parted
     alike = np.exp(-cdist(places, places, "sqeuclidean") / (2 * REACH**2))
     sampled = np.stack([(sampling @ field).ravel() for field in fields], axis=1)
+    shrink = shrinkage([table.names[k] for k in pick])
     opening, contraction = 0.2, np.full(len(pick), 0.3)
     for _ in range(ROUNDS):
         unlike = unlikeness(table, fields, opening, contraction)
@@ -72,15 +77,33 @@ def explain(table: Responses, vertices, sampling, offsets, people, names=None, n
         jaw = (sampling @ table.jaw_at(step)).ravel() / step
         system = solve_triangular(factor[0], np.column_stack([jaw, sampled]), lower=True)
         right = solve_triangular(factor[0], y, lower=True)
-        shrink = np.eye(len(pick) + 1) / USUAL
-        found, _ = nnls(np.concatenate([system, shrink]), np.concatenate([right, np.zeros(len(pick) + 1)]))
-        opening, contraction = float(found[0]), found[1:]
+        system = np.column_stack([system, np.zeros(len(system))])  # the smile has no field but its muscles'
+        found, _ = nnls(np.concatenate([system, shrink]), np.concatenate([right, np.zeros(len(shrink))]))
+        opening, contraction = float(found[0]), found[1:-1]
     modelled = table.jaw_at(opening) + np.einsum("k,knj->nj", contraction, fields)
     left = y - jaw * opening - sampled @ contraction
     weights = cho_solve(factor, left).reshape(-1, 3)
     across = np.exp(-cdist(parted, places, "sqeuclidean") / (2 * REACH**2)) * unlike[:, None] * error[None, :]
     muscles = {table.names[k]: float(a) for k, a in zip(pick, contraction, strict=True)}
     return Expression(opening, muscles, modelled + across @ weights, modelled)
+
+
+def shrinkage(names) -> np.ndarray:
+    """Rows (r, k + 2) that cost nothing where jaw and muscles do what faces usually do: little, both sides alike, and
+    those of a smile together. Columns: the jaw, the muscles ``names``, the smile's strength."""
+    count = len(names)
+    joy = expressions()["joy"].muscles
+    rows = [np.zeros(count + 2), np.zeros(count + 2)]
+    rows[0][0], rows[1][-1] = 1 / OPEN, 1 / SMILE
+    for k, name in enumerate(names):
+        row = np.zeros(count + 2)
+        row[k + 1], row[-1] = 1 / ALONE, -joy.get(name, 0.0) / ALONE
+        rows.append(row)
+        if name.endswith("_l") and name[:-1] + "r" in names:
+            row = np.zeros(count + 2)
+            row[k + 1], row[names.index(name[:-1] + "r") + 1] = 1 / UNEVEN, -1 / UNEVEN
+            rows.append(row)
+    return np.array(rows)
 
 
 def unlikeness(table: Responses, fields, opening: float, contraction) -> np.ndarray:
