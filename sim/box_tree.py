@@ -1,10 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Which boxes of one set overlap which of another: a binary tree of boxes over each, walked together level by level."""
+"""Which boxes of one set overlap which of another, and which lie near points: binary trees walked level by level."""
+
+from functools import cached_property
 
 import numpy as np
 
-#: Pairs of nodes looked at in one go.
-BLOCK = 2_000_000
+#: Pairs of nodes looked at in one go, and points.
+BLOCK, POINTS = 2_000_000, 4000
+#: Levels of a tree that are passed over: near the root every box is near every point.
+ROOTS = 3
 
 
 class BoxTree:
@@ -32,6 +36,38 @@ class BoxTree:
         """The boxes round triangles (m, 3) over vertices (n, 3) mm, each ``margin`` mm larger."""
         corners = np.asarray(vertices, dtype=float)[triangles]
         return cls(corners.min(axis=1) - margin, corners.max(axis=1) + margin)
+
+    @cached_property
+    def _planes(self):
+        """Per level the corners as planes (6, k), which is what many points are compared with fastest."""
+        return [np.concatenate([low.T, high.T]) for low, high in zip(self.low, self.high, strict=True)]
+
+    def near(self, points, reach):
+        """Pairs of a point and a box no farther than ``reach`` (k,) mm from it: (p,) ascending and (p,).
+
+        points : (k, 3) mm
+        """
+        found = [(np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64))]
+        for start in range(0, len(points), POINTS):
+            planes = np.ascontiguousarray(points[start : start + POINTS].T)
+            square = np.asarray(reach[start : start + POINTS]) ** 2
+            level = min(ROOTS, self.depth)
+            row = np.repeat(np.arange(len(square)), 1 << level)
+            node = np.tile(np.arange(1 << level), len(square))
+            while True:
+                corner, at = self._planes[level].take(node, axis=1), planes.take(row, axis=1)
+                gap = np.maximum(np.maximum(corner[:3] - at, at - corner[3:]), 0)
+                keep = np.flatnonzero(gap[0] * gap[0] + gap[1] * gap[1] + gap[2] * gap[2] <= square[row])
+                row, node = row[keep], node[keep]
+                if level == self.depth:
+                    break
+                level += 1
+                row = np.repeat(row, 2)
+                node = np.repeat(2 * node, 2)
+                node[1::2] += 1
+            found.append((start + row, self.order[node]))
+        first, second = (np.concatenate(x) for x in zip(*found, strict=True))
+        return first, second
 
     def overlaps(self, other: "BoxTree") -> tuple[np.ndarray, np.ndarray]:
         """(k,), (k,) indices of a box of this tree and one of ``other`` that overlap; with itself, each pair once."""

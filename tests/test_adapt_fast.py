@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
-from headshop.sim import triangle_projection
+from headshop.sim import box_tree, triangle_projection
 from headshop.sim.adapt import closest
 from headshop.sim.adapt.closest import Surface, least
 from headshop.sim.adapt.scan_surface import scan_surface
@@ -71,8 +71,8 @@ def test_closest_is_the_closest_of_all(uneven, reach, monkeypatch):
     found = surface.closest(queries, reach)
     np.testing.assert_array_equal(found.found, brute <= reach)
     np.testing.assert_allclose(found.distance[found.found], brute[brute <= reach], atol=1e-9)
-    monkeypatch.setattr(closest, "FIRST", 2)
     monkeypatch.setattr(closest, "BATCH", 5)
+    monkeypatch.setattr(box_tree, "POINTS", 3)
     again = surface.closest(queries, reach)
     np.testing.assert_array_equal(found.distance, again.distance)
 
@@ -172,3 +172,17 @@ def test_a_surface_turned_is_that_of_triangles_turned(uneven):
         mine, theirs = one.closest(queries), other.closest(queries)
         np.testing.assert_allclose(mine.distance, theirs.distance, atol=1e-12)
         np.testing.assert_allclose(mine.points, theirs.points, atol=1e-9)
+
+
+def test_boxes_near_points_are_all_found(monkeypatch):
+    rng = np.random.default_rng(7)
+    for count in (1, 5, 300):
+        low = rng.normal(0, 40, (count, 3))
+        high = low + rng.uniform(0, 10, (count, 3))
+        points, reach = rng.normal(0, 50, (40, 3)), rng.uniform(0, 40, 40)
+        gap = np.maximum(np.maximum(low[None] - points[:, None], points[:, None] - high[None]), 0)
+        row, box = box_tree.BoxTree(low, high).near(points, reach)
+        wanted = np.argwhere(np.linalg.norm(gap, axis=2) <= reach[:, None])
+        np.testing.assert_array_equal(sorted(zip(row.tolist(), box.tolist(), strict=True)), wanted)
+        assert (np.diff(row) >= 0).all()
+    assert len(box_tree.BoxTree(low, high).near(np.zeros((0, 3)), np.zeros(0))[0]) == 0

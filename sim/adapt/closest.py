@@ -12,13 +12,14 @@ import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import connected_components
 
+from ..box_tree import BoxTree
 from ..mesh import cross_sides, vertex_normals
 from ..triangle_projection import Triangles
 from .cover import Cover
 from .merging import clustered, weld
 
 FIRST = 8  # nearest samples of a point that are looked at before it is known how many more must be
-BATCH = 4000  # points whose lists of samples are held at once
+BATCH = 20_000  # points looked at together
 ENOUGH = 300_000  # triangles that show all of a head that a mesh of some thousand vertices can follow
 
 
@@ -91,6 +92,10 @@ class Surface:
         return Cover(self.corners, self.area)
 
     @cached_property
+    def _boxes(self) -> BoxTree:
+        return BoxTree.of(self.vertices, self.triangles)
+
+    @cached_property
     def _sides(self):
         """Sides of the triangles, each once: vertices (e,) and (e,), and how many triangles it belongs to (e,)."""
         n = len(self.vertices)
@@ -148,6 +153,7 @@ class Surface:
             "_smooth",
             "_double",
             "_cover",
+            "_boxes",
             "_sides",
             "edge_length",
             "border_vertex",
@@ -203,29 +209,22 @@ class Surface:
         best = np.full(len(points), np.inf)
         triangle, weights = np.full(len(points), -1), np.zeros((len(points), 3))
 
-        def improve(row, owner, far):
-            """Let the pairs of query and triangle compete, if their nearest sample is near enough."""
-            some = np.flatnonzero(far - cover.radius[owner] < best[row])
-            row, owner = self._once(row[some], owner[some])
+        def improve(row, owner):
+            """Let the pairs of query and triangle compete."""
             w, d = self._solid.closest(points, row, owner)
             at, pick = least(row, d)
             better = d[pick] < best[at]
             at, pick = at[better], pick[better]
             best[at], triangle[at], weights[at] = d[pick], owner[pick], w[pick]
 
-        cover = self._cover
-        far, sample = cover.nearest(points, FIRST, reach)
+        # The triangle of the nearest sample bounds the distance; only boxes nearer than that can hold a nearer one.
+        far, sample = self._cover.nearest(points, 1, reach)
         near = np.flatnonzero(np.isfinite(far[:, 0]))
-        improve(near, cover.owner[sample[near, 0]], far[near, 0])
-        row, column = np.nonzero(np.isfinite(far[:, 1:]))
-        improve(row, cover.owner[sample[row, column + 1]], far[row, column + 1])
-        # No other triangle can be nearer than its nearest sample less the covering radius; where that leaves doubt,
-        # all triangles with a sample in the ball of doubt are tried.
-        doubt = np.flatnonzero((far[:, -1] - cover.most < best) & np.isfinite(far[:, -1]))
-        for start in range(0, len(doubt), BATCH):
-            at = doubt[start : start + BATCH]
-            row, sample, far = cover.within(points[at], best[at] + cover.most)
-            improve(at[row], cover.owner[sample], far)
+        improve(near, self._cover.owner[sample[near, 0]])
+        for start in range(0, len(near), BATCH):
+            at = near[start : start + BATCH]
+            row, owner = self._boxes.near(points[at], best[at] * (1 + 1e-12))
+            improve(at[row], owner)
         found = np.flatnonzero(best <= reach)
         return self._contacts(len(points), found, best[found], triangle[found], weights[found])
 
