@@ -8,10 +8,12 @@ fitted is the surface as it is drawn, and data between the vertices counts as mu
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import csr_matrix
+from scipy.sparse import coo_matrix, csr_matrix, diags
 
 from ..mesh import Mesh, edges
 from ..mesh_subdivision import smoother
+
+SAG = 0.25  # of the way to the mean of the points beside; 1/3 for an even grid of flat quads, 0 for the smooth surface
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,29 +23,45 @@ class DrawnPoints:
     rows (s, n) : every point of the mesh subdivided once; the first n are the cage's own vertices, then come one for
         each edge and one for each face
     triangles (t, 3) : of that mesh
-    look (s,) bool : points that look for data: all the cage's vertices around them do
+    seen (s,) bool : points a scanner can see: all the cage's vertices around them are seen
+    around (s, s) : mean of the points beside each
+    look (s,) bool : points that look for data, likewise
     coarse (s,) bool : those of them at vertices and in the middles of faces
     """
 
     rows: csr_matrix
     triangles: np.ndarray
+    around: csr_matrix
+    seen: np.ndarray
     look: np.ndarray
     coarse: np.ndarray
 
+    def between(self, points) -> np.ndarray:
+        """``points`` (s, 3) moved to where the flat triangles around them lie in the mean: a curved surface bulges over
+        them, and is to be as far outside the data at its points as inside it between them."""
+        return points + SAG * (self.around @ points - points)
+
     @property
     def outer(self) -> np.ndarray:
-        """Triangles (o, 3) between points that look for data."""
-        return self.triangles[self.look[self.triangles].all(axis=1)]
+        """Triangles (o, 3) between points that are seen."""
+        return self.triangles[self.seen[self.triangles].all(axis=1)]
 
 
-def drawn_points(faces, free) -> DrawnPoints:
-    """The `DrawnPoints` of a cage with ``faces`` (m, 4), of which the vertices ``free`` (n,) bool look for data."""
+def drawn_points(faces, free, seen) -> DrawnPoints:
+    """The `DrawnPoints` of a cage with ``faces`` (m, 4), of which the vertices ``free`` (n,) bool look for data and
+    ``seen`` (n,) bool can be seen."""
     n = len(free)
     rows, quads = smoother(faces, n)
     pair = edges(faces)
-    real = faces >= 0
-    face_free = np.where(real, free[faces], True).all(axis=1)
-    look = np.concatenate([free, free[pair].all(axis=1), face_free])
+
+    def between(chosen):
+        return np.concatenate([chosen, chosen[pair].all(axis=1), np.where(faces >= 0, chosen[faces], True).all(axis=1)])
+
+    look = between(free)
     coarse = look.copy()
     coarse[n : n + len(pair)] = False
-    return DrawnPoints(rows, Mesh(np.zeros((rows.shape[0], 3)), quads).triangles, look, coarse)
+    a, b = edges(quads).T
+    link = coo_matrix((np.ones(2 * len(a)), (np.r_[a, b], np.r_[b, a])), shape=(rows.shape[0],) * 2).tocsr()
+    around = (diags(1 / np.maximum(np.asarray(link.sum(axis=1)).ravel(), 1)) @ link).tocsr()
+    triangles = Mesh(np.zeros((rows.shape[0], 3)), quads).triangles
+    return DrawnPoints(rows, triangles, around, between(seen), look, coarse)

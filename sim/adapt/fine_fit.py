@@ -24,15 +24,17 @@ SCHEDULE = (
     (0.6, 8.0, 2.5),
     (0.25, 6.0, 2.0),
     (0.1, 5.0, 1.5),
-    (0.05, 4.0, 1.2),
-    (0.03, 4.0, 1.0),
-    (0.02, 4.0, 1.0),
+    (0.04, 4.0, 1.2),
+    (0.015, 4.0, 1.0),
+    (0.005, 4.0, 1.0),
 )
 ALONG = 0.02  # weight of a pull along the surface against one across it
 AGREE = 0.6  # cosine between the normals of skin and scan
 WHOLE = 150.0  # mm²: a piece of data smaller than this is trusted in proportion
 FINEST = 4.0  # most by which fine parts of the mesh are stiffened
 FINE = 0.2  # stiffness below which data in between the cage's vertices is looked for too
+LAST = 0.02  # stiffness below which rims look for data
+CLOSE = 1.5  # mm: how far they look
 STRETCH = 0.002  # weight of first differences, which keeps the mesh from sliding where bending is free
 
 
@@ -72,7 +74,7 @@ def matches(points, normals, target: Surface, reach: float):
     return found, trust
 
 
-def fine_fit(cage, faces, free, target: Surface, anchors: Anchors, stiffness=None, rounds=SCHEDULE):
+def fine_fit(cage, faces, free, rim, target: Surface, anchors: Anchors, stiffness=None, rounds=SCHEDULE):
     """A generator: yields the fraction done, returns `Fitted`.
 
     Parameters
@@ -80,6 +82,7 @@ def fine_fit(cage, faces, free, target: Surface, anchors: Anchors, stiffness=Non
     cage (n, 3) mm : the cage of the warped skin
     faces (m, 4) : its quads
     free (n,) bool : vertices that look for data; the others (mouth bag, lid backs, nostrils) follow smoothly
+    rim (n,) bool : vertices that look for data in the last rounds only, and only close by (margins of lips and lids)
     stiffness (n,) : factor on the bending stiffness of each vertex (1 everywhere by default)
     """
     base = np.array(cage, dtype=float)
@@ -87,17 +90,19 @@ def fine_fit(cage, faces, free, target: Surface, anchors: Anchors, stiffness=Non
     stiffness = np.ones(n) if stiffness is None else np.array(stiffness, dtype=float)
     bend = laplacian(base, faces)
     stiffness = stiffness * fineness(base, faces)
-    surface = drawn_points(faces, free)
+    surface = drawn_points(faces, free, free | rim)
     held = (anchors.sampling @ surface.rows[:n]).tocsr()
     start = surface.rows @ base
     displacement = np.zeros((n, 3))
     for turn, (soft, reach, width) in enumerate(rounds):
         now = surface.rows @ (base + displacement)
         normal = vertex_normals(now, surface.outer)
-        look = np.flatnonzero(surface.look if soft < FINE else surface.coarse)
-        found, trust = matches(now[look], normal[look], target, reach)
+        look = np.flatnonzero(surface.seen if soft < LAST else surface.look if soft < FINE else surface.coarse)
+        points = surface.between(now)[look]
+        found, trust = matches(points, normal[look], target, reach)
+        trust[~surface.look[look] & (found.distance > CLOSE)] = 0
         use = np.flatnonzero(trust > 0)
-        gap = found.points[use] - now[look[use]]
+        gap = found.points[use] - points[use]
         # The direction of the data's normal decides; a pinch of the skin's own keeps it calm on rough data.
         facing = found.normals[use] + 0.5 * normal[look[use]]
         facing /= np.linalg.norm(facing, axis=1, keepdims=True)

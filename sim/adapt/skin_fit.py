@@ -134,7 +134,7 @@ def fit_skin(reference: Head, target: Surface, given: dict[str, np.ndarray]) -> 
         np.concatenate([weight, np.full(len(margin), HOLD), together.weight]),
     )
     start = undrawn(skin.faces, moved + (whole.skin.vertices - skin.vertices) @ matrix.T, moved)
-    work = fine_fit(start, skin.faces, free, data, anchors, stiffness)
+    work = fine_fit(start, skin.faces, free, rim & ~unseen, data, anchors, stiffness)
     fitted = None
     while fitted is None:
         try:
@@ -206,5 +206,5 @@ def freedom(reference: Head, given, rim, unseen):
     for name in STIFF:
         stiffness += 4.0 * group(reference, name)
     for side in ("l", "r"):
-        stiffness += 4.0 * group(reference, f"ear_{side}")
+        stiffness += 20.0 * group(reference, f"ear_{side}")
     return free, stiffness + 40.0 * unseen
