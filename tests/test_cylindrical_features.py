@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_matrix
 
+from headshop.sim.adapt.closest import Surface
 from headshop.sim.adapt.completion import sigma
 from headshop.sim.cylindrical.adaptation import adapt
 from headshop.sim.cylindrical.features import find_features
@@ -12,6 +13,7 @@ from headshop.sim.cylindrical.laplacian import edge_field, laplacian_field
 from headshop.sim.cylindrical.pose import find_pose
 from headshop.sim.cylindrical.range_map import RangeMap, resample
 from headshop.sim.cylindrical.relaxation import filled, relaxed
+from headshop.sim.cylindrical.second_opinion import weighed
 from headshop.sim.cylindrical.springs import relax
 from headshop.sim.errors import InputError
 from headshop.sim.mesh import Mesh, vertex_normals
@@ -183,3 +185,24 @@ def test_springs_at_rest_stay_and_pins_pull(reference):
     np.testing.assert_allclose(moved[66], flat[66] + [4.0, -3.0], atol=0.05)
     off = np.linalg.norm(moved - flat, axis=1)
     assert off[66] == off.max() and off[65] > 0.5 and np.isfinite(off).all()
+
+
+def test_landmarks_that_are_off_are_drawn_to_the_features_of_the_map(reference, person):
+    mesh, marks, _ = person
+    turn = np.array([[0.0, 0, -1], [1, 0, 0], [0, -1, 0]])  # a head lying on its side is as good
+    mesh = mesh.moved(mesh.vertices @ turn.T)
+    surface = Surface(mesh.vertices, mesh.triangles)
+    off = {
+        n: turn @ p + v for (n, p), v in zip(marks.items(), np.random.default_rng(4).normal(0, 3, (60, 3)), strict=True)
+    }
+    off = {n: surface.closest(p[None]).points[0] for n, p in off.items()}
+    better = finish(weighed(mesh, off, dict.fromkeys(off, 1.0), reference, surface))
+    assert list(better) == list(off)
+
+    def error(positions):
+        return np.mean([np.linalg.norm(positions[n] - turn @ p) for n, p in marks.items() if sigma(n) < 2])
+
+    assert error(better) < 0.8 * error(off)
+    assert surface.closest(np.array(list(better.values()))).distance.max() < 1e-6
+    few = {n: off[n] for n in ("prn", "ex_l", "ex_r")}
+    assert finish(weighed(mesh, few, dict.fromkeys(few, 1.0), reference, surface)) is few

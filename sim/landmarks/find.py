@@ -9,9 +9,10 @@ from ..adapt.closest import Surface
 from ..adapt.scan_surface import NORMALS
 from ..anatomy.head import Head
 from ..anatomy.storage import load_head
+from ..cylindrical.second_opinion import weighed
 from ..errors import InputError
 from ..mesh import Mesh, vertex_normals
-from ..progress import Progress, Work
+from ..progress import Progress, Work, portion
 from ..scan.face_match import face_template, surface_samples
 from .confidence import judge
 from .pose_search import search_poses
@@ -91,7 +92,9 @@ def find_landmarks(mesh: Mesh, reference: Head | None = None, unit_scales=(1.0,)
     if not trials:
         raise InputError(NO_FACE)
     _, scale, fit, target = min(trials, key=lambda t: t[0])
-    fit = yield from _run(fit_shape(space, target, fit.pose, coefficients=fit.coefficients), 0.5, 0.9, "Fitting a face")
+    fit = yield from _run(
+        fit_shape(space, target, fit.pose, coefficients=fit.coefficients), 0.5, 0.85, "Fitting a face"
+    )
     misfit = _misfit(space, fit)
     if misfit > POOR:
         raise InputError(NO_FACE)
@@ -99,6 +102,8 @@ def find_landmarks(mesh: Mesh, reference: Head | None = None, unit_scales=(1.0,)
     confidence, mid_air, missing = judge(space, fit, target, positions)
     positions = {n: p for n, p in positions.items() if n not in missing}
     confidence = {n: confidence[n] for n in positions}
+    seen = Mesh.from_triangles(target.vertices, target.triangles)
+    positions = yield from portion(weighed(seen, positions, confidence, reference, target), 0.9, 1.0)
     return FoundLandmarks(positions, confidence, mid_air, missing, scale, misfit)
 
 
