@@ -41,8 +41,7 @@ def build(options) -> None:
         if landmarks is None:
             work = pipeline.build_alone(options.scan, name, options.units, options.up, **wanted)
         else:
-            scan = pipeline.load_scan(options.scan, landmarks, options.units, options.up)
-            work = pipeline.build(scan, scan.orientation.turn(landmarks), name, **wanted)
+            work = pipeline.build_file(options.scan, landmarks, name, options.units, options.up, **wanted)
         skin, report = _run(work, options)
         _set_stage(skin)
         _save(blend)

@@ -57,15 +57,12 @@ def run(folder: Path, seed: int | None = None) -> None:
     from ..sim.adapt.landmarks import read_landmarks
     from . import baking, pipeline
     from .contact_sheet import render_sheet
-    from .materials import dress_head
     from .movie import render_movie
     from .stage import set_stage
 
     with _step("build") as say:
         landmarks = read_landmarks(landmark_file)
-        scan = pipeline.load_scan(scan_file, landmarks)
-        skin, report = _finish(pipeline.build(scan, scan.orientation.turn(landmarks), "Sample"))
-        dress_head(skin)
+        skin, report = _finish(pipeline.build_file(scan_file, landmarks, "Sample"))
         set_stage(_scene(), skin)
         fit, anatomy = report["fit"], report["anatomy"]
         say(f"head with {anatomy['muscles']} muscles, {fit['mean_mm']:.2f} mm from the scan on average")

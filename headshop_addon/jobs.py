@@ -160,6 +160,31 @@ class Job:
         _redraw_sidebars(context)
 
 
+class FileJob(Job):
+    """Mixin of a job on a file that is chosen first; goes before ``ImportHelper`` among the bases.
+
+    The file browser calls ``execute`` of an operator that it ends itself, so the job starts as a second call, with
+    ``direct`` set. Scripts, and changes of its settings afterwards, run to the end at once.
+    """
+
+    direct: bpy.props.BoolProperty(options={"HIDDEN", "SKIP_SAVE"})
+
+    def invoke(self, context, event):
+        """Ask for the file, or run under a timer if it is known."""
+        from bpy_extras.io_utils import ImportHelper
+
+        return super().invoke(context, event) if self.direct else ImportHelper.invoke(self, context, event)
+
+    def execute(self, context):
+        """Start the job on the file that was chosen."""
+        if bpy.app.background or context.window is None or self.direct or not self.options.is_invoke:
+            return super().execute(context)
+        module, _, name = type(self).bl_idname.partition(".")
+        again = self.as_keywords(ignore=("filter_glob", "direct"))
+        getattr(getattr(bpy.ops, module), name)("INVOKE_DEFAULT", direct=True, **again)
+        return {"CANCELLED"}  # this call did nothing itself: no step to undo
+
+
 def _redraw_sidebars(context):
     for window in context.window_manager.windows:
         for area in window.screen.areas:

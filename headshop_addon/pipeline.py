@@ -36,8 +36,8 @@ class Scan:
     seconds: dict = field(default_factory=dict)
 
 
-def load_scan(path, landmarks: dict | None = None, unit: str | None = None, up: str | None = None) -> Scan:
-    """Read, clean and turn upright a scan file.
+def load_scan(path, landmarks: dict | None = None, unit: str | None = None, up: str | None = None) -> Work:
+    """Work returning the `Scan` of a file: read, cleaned and turned upright.
 
     landmarks : name -> (3,) mm along the file's own axes; they help to find the axes, see `Orientation.turn`
     unit, up : override what is detected: a name in `orientation.UNITS`, an axis such as ``+Y``
@@ -47,15 +47,18 @@ def load_scan(path, landmarks: dict | None = None, unit: str | None = None, up: 
     InputError : the file cannot be read or is no head (`scan_import`, `sim.scan.clean`, `sim.scan.orientation`).
     """
     seconds: dict[str, float] = {}
+    yield Progress(0.0, "Reading the scan")
     with timed(seconds, "read"):
         raw = read_scan(path)
     with timed(seconds, "clean"):
-        return prepare_scan(raw, landmarks, unit, up, seconds)
+        return (yield from portion(prepare_scan(raw, landmarks, unit, up, seconds), 0.4, 1.0))
 
 
-def prepare_scan(raw: Mesh, landmarks=None, unit=None, up=None, seconds=None) -> Scan:
-    """Clean a mesh in any unit and axes and bring it to mm, Z up, face toward -Y; see `load_scan`."""
+def prepare_scan(raw: Mesh, landmarks=None, unit=None, up=None, seconds=None) -> Work:
+    """Work that cleans a mesh in any unit and axes and brings it to mm, Z up, face toward -Y; see `load_scan`."""
+    yield Progress(0.0, "Cleaning the scan")
     mesh, counts = clean_scan(raw)
+    yield Progress(0.5, "Finding out which way is up")
     return _upright(mesh, counts, detect(mesh, landmarks, unit=unit, up=up), seconds)
 
 
@@ -84,6 +87,7 @@ def load_scan_alone(path, unit: str | None = None, up: str | None = None) -> Wor
     yield Progress(0.0, "Reading the scan")
     with timed(seconds, "read"):
         raw = read_scan(path)
+    yield Progress(0.02, "Cleaning the scan")
     with timed(seconds, "clean"):
         mesh, counts = clean_scan(raw)
     with timed(seconds, "landmarks"):
@@ -153,6 +157,18 @@ def build(
         yield from portion(dressing(skin), 0.94, 1.0)
     heads.write_report(skin, report)
     return skin, report
+
+
+def build_file(path, landmarks, name: str, unit=None, up=None, **options) -> Work:
+    """A scan file and landmarks (mm along the file's own axes) to a head; returns what `build` does, to which further
+    ``options`` go.
+
+    Raises
+    ------
+    InputError : the file cannot be read, is no head, or the landmarks do not fit it.
+    """
+    scan = yield from portion(load_scan(path, landmarks, unit, up), 0.0, 0.1)
+    return (yield from portion(build(scan, scan.orientation.turn(landmarks), name, **options), 0.1, 1.0))
 
 
 def build_alone(path, name: str, unit: str | None = None, up: str | None = None, **options) -> Work:

@@ -15,27 +15,27 @@ from mathutils import Matrix, Vector
 from ..sim.adapt.landmarks import read_landmarks, write_landmarks
 from ..sim.anatomy.landmark_names import SKIN
 from ..sim.errors import InputError
-from ..sim.progress import Work
+from ..sim.progress import Work, finish
 from ..sim.scan.orientation import Orientation
 from . import active, bridge, heads, pipeline, scan_landmarks
 
 TURN = "headshop_turn"
 
 
-def import_scan(context, path, unit: str | None = None, up: str | None = None) -> bpy.types.Object:
-    """Read a scan file into the scene and choose it; returns the object.
+def import_scan(context, path, unit: str | None = None, up: str | None = None) -> Work:
+    """Work that reads a scan file into the scene and chooses it; returns the object.
 
     Raises
     ------
     InputError : the file cannot be read or is no head.
     """
-    scan = pipeline.load_scan(path, None, unit, up)
+    scan = yield from pipeline.load_scan(path, None, unit, up)
     return _add(context, scan, Path(path).stem)
 
 
 def add_sample(context, sample, with_landmarks: bool = True) -> bpy.types.Object:
     """Put the sample subject's scan into the scene, cleaned like any other, and choose it; returns the object."""
-    scan = pipeline.prepare_scan(sample.scan, sample.landmarks)
+    scan = finish(pipeline.prepare_scan(sample.scan, sample.landmarks))
     obj = _add(context, scan, "Sample")
     if with_landmarks:
         turned = scan.orientation.turn(sample.landmarks)
@@ -43,14 +43,15 @@ def add_sample(context, sample, with_landmarks: bool = True) -> bpy.types.Object
     return obj
 
 
-def adopt(context, original: bpy.types.Object) -> bpy.types.Object:
-    """A clean, upright copy of a mesh object as the scan, in the original's place; the original is hidden.
+def adopt(context, original: bpy.types.Object) -> Work:
+    """Work that makes a clean, upright copy of a mesh object the scan, in the original's place, and hides the original;
+    returns the copy.
 
     Raises
     ------
     InputError : it is no head (`sim.scan.clean`, `sim.scan.orientation`).
     """
-    scan = pipeline.prepare_scan(bridge.object_to_mesh(original))
+    scan = yield from pipeline.prepare_scan(bridge.object_to_mesh(original))
     obj = _add(context, scan, f"{original.name} Scan")
     turn = scan.orientation.matrix  # mm to mm here: the translation is zero, so it serves for metres too
     obj.matrix_world = original.matrix_world @ Matrix(np.linalg.inv(turn).tolist())

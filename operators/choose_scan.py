@@ -4,15 +4,16 @@
 import bpy
 
 from ..headshop_addon import heads, polls
-from ..headshop_addon.jobs import Simple
+from ..headshop_addon.jobs import Job
 
 
-class HEADSHOP_OT_choose_scan(Simple, bpy.types.Operator):
+class HEADSHOP_OT_choose_scan(Job, bpy.types.Operator):
     """Take a cleaned, upright copy of the active mesh object as the scan, in the same place"""
 
     bl_idname = "headshop.choose_scan"
     bl_label = "Use Active Object"
     bl_options = {"REGISTER", "UNDO"}
+    panel = "scan"
 
     @classmethod
     def poll(cls, context):
@@ -23,8 +24,14 @@ class HEADSHOP_OT_choose_scan(Simple, bpy.types.Operator):
             return False
         return polls.library(cls, "scipy") and polls.object_mode(cls, context)
 
-    def act(self, context):
+    def work(self, context):
         """Copy, clean, turn upright."""
         from ..headshop_addon import scan_objects
 
-        return scan_objects.summary(scan_objects.adopt(context, context.active_object))
+        return (yield from scan_objects.adopt(context, context.active_object))
+
+    def finish(self, context, result):
+        """Say what came in."""
+        from ..headshop_addon import scan_objects
+
+        return scan_objects.summary(result)

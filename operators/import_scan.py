@@ -5,7 +5,7 @@ import bpy
 from bpy_extras.io_utils import ImportHelper
 
 from ..headshop_addon import polls
-from ..headshop_addon.jobs import Simple
+from ..headshop_addon.jobs import FileJob
 
 UNITS = (
     ("AUTO", "Detect", "Judge by the size of the head"),
@@ -23,12 +23,13 @@ UP = (
 )
 
 
-class HEADSHOP_OT_import_scan(Simple, ImportHelper, bpy.types.Operator):
+class HEADSHOP_OT_import_scan(FileJob, ImportHelper, bpy.types.Operator):
     """Read a head scan (PLY, OBJ, STL, glTF, USD, FBX or a range map), clean it and set it upright in real size"""
 
     bl_idname = "headshop.import_scan"
     bl_label = "Import Scan"
     bl_options = {"REGISTER", "UNDO"}
+    panel = "scan"
 
     filename_ext = ""
     filter_glob: bpy.props.StringProperty(
@@ -42,10 +43,15 @@ class HEADSHOP_OT_import_scan(Simple, ImportHelper, bpy.types.Operator):
         """Needs the cleaning code."""
         return polls.library(cls, "scipy") and polls.object_mode(cls, context)
 
-    def act(self, context):
+    def work(self, context):
         """Read, clean, turn upright, add."""
         from ..headshop_addon import scan_objects
 
         unit, up = (None if value == "AUTO" else value for value in (self.unit, self.up))
-        scan = scan_objects.import_scan(context, self.filepath, unit, up)
-        return scan_objects.summary(scan)
+        return (yield from scan_objects.import_scan(context, self.filepath, unit, up))
+
+    def finish(self, context, result):
+        """Say what came in."""
+        from ..headshop_addon import scan_objects
+
+        return scan_objects.summary(result)

@@ -5,6 +5,7 @@ import numpy as np
 from scipy.sparse import csr_matrix, diags, identity, vstack
 
 from ..mesh import Mesh
+from ..progress import Progress, Work, finish
 from .bone import THIN
 from .skin_cover import SkinCover
 from .smooth_system import factorised, laplacian
@@ -16,7 +17,12 @@ FIRM, FIRMER, FIRMEST = 4.0, 3.0, 400.0
 
 
 def keep_inside(bone: Mesh, cover: SkinCover, least, rounds: int = 12) -> np.ndarray:
-    """Bone vertices (n, 3) moved smoothly until all of it lies ``least`` (n,) mm or deeper under the skin.
+    """`keeping_inside`, at once."""
+    return finish(keeping_inside(bone, cover, least, rounds))
+
+
+def keeping_inside(bone: Mesh, cover: SkinCover, least, rounds: int = 12) -> Work:
+    """Work returning bone vertices (n, 3) moved smoothly until all lie ``least`` (n,) mm or deeper under the skin.
 
     The displacement has the least bending energy among those that give what is asked at all places found too near:
     places of the bone under the skin, and places of the skin over the bone, since either may have the larger faces.
@@ -24,6 +30,7 @@ def keep_inside(bone: Mesh, cover: SkinCover, least, rounds: int = 12) -> np.nda
     """
     start = bone.vertices
     n = len(start)
+    yield Progress(0.0, "Bone under the skin")
     bend = laplacian(start, bone.faces)
     smooth = (bend.T @ bend + 0.02 * identity(n)).tocsr()
     look = vstack([identity(n), middles(bone.triangles, n)]).tocsr()
@@ -39,17 +46,20 @@ def keep_inside(bone: Mesh, cover: SkinCover, least, rounds: int = 12) -> np.nda
     asked = Asked(look, len(cover.points))
     lack, checked = np.full(len(watch), np.inf), np.zeros((len(watch), 3))
     moved = start
-    for _ in range(rounds):
+    for turn in range(rounds):
+        yield Progress((turn + 1) / (rounds + 1), "Bone under the skin")
         now = look @ (moved - start)
         # A place that went on by less than it has to spare needs no other look.
         again = np.flatnonzero(lack + np.linalg.norm(now - checked, axis=1) > -SLACK)
         push, lack[again] = cover.push(look[again] @ start + now[again], need[again])
         checked[again] = now[again]
         wrong = np.linalg.norm(push, axis=1) > SLACK
+        yield Progress((turn + 1.3) / (rounds + 1), "Bone under the skin")
         above, corners, weights, pull = cover.pull(bone.moved(moved), triangles, above, least)
         wants = np.linalg.norm(pull, axis=1) > SLACK
         if not wrong.any() and not wants.any():
             break
+        yield Progress((turn + 1.6) / (rounds + 1), "Bone under the skin")
         asked.places(again[wrong], longer(push[wrong]), now)
         asked.over(above[wants], corners[wants], weights[wants], longer(pull[wants]), moved - start)
         rows, weight, goal = asked.system()

@@ -73,16 +73,19 @@ def build_head(
     require_choice(relax)
     yield Progress(0.0, "Looking at the scan")
     target = scan_surface(reference, scan, given)
+    yield Progress(0.05, "Judging the landmarks")
     check_against_scan(given, target)
     check_arrangement(reference.landmark_positions(), given)
+    yield Progress(0.08, "Judging the landmarks")
     check_on_surface(given, target)
-    fit = yield from portion(fit_skin(reference, target, given), 0.1, 0.7)
+    fit = yield from portion(fit_skin(reference, target, given), 0.1, 0.6)
+    yield Progress(0.6, "Judging the fit")
     refuse_poor(fit_report(reference, fit, given))
     check_likeness(fit.reference, fit.cage, fit.fitted.fitted)
-    yield Progress(0.68, "Relaxing the face")
+    yield Progress(0.62, "Relaxing the face")
     base, neutral = to_be_followed(fit, relax)
     skin = fit.cage if neutral is None else neutral.skin
-    followed = yield from portion(follow(base, skin, fit.unseen), 0.7, 0.85)
+    followed = yield from portion(follow(base, skin, fit.unseen), 0.63, 0.85)
     yield Progress(0.85, "Checking the anatomy")
     head = followed.head
     scanned = head.skin.vertices + (fit.cage - skin)
@@ -90,6 +93,7 @@ def build_head(
     report["invented"] = invented(fitted_shares(head, fit.fitted.fitted))
     report["sentence"] = fit_sentence(report, report["invented"])
     report["relaxed"] = None if neutral is None else neutral.report
+    yield Progress(0.87, "Checking the anatomy")
     anatomy = anatomy_report(head)
     missing = tuple(n for n in SKIN if n not in given)
     attributes = {

@@ -9,7 +9,8 @@ from scipy.spatial import cKDTree
 from ..anatomy.eyeball import BALL
 from ..anatomy.head import Eye, Head
 from ..mesh import Mesh
-from .flesh import cleared
+from ..progress import Work
+from .flesh import clearing
 from .lid_contact import BACK, SEEN, LidContact, height_over
 from .refine import thinned
 from .thin_plate_spline import System, similarity
@@ -87,8 +88,8 @@ def eye_similarity(old: Eye, new: Eye, turn):
     return lambda points: (points - old.centre) @ turn.T * (new.radius / old.radius) + new.centre
 
 
-def eye_part(rest: "Rest", side: str, skin, carried, eye: Eye) -> np.ndarray:
-    """The eye part (n, 3) mm: the ball as ``carried`` takes it, the caruncle as ball and lids around it go.
+def eye_part(rest: "Rest", side: str, skin, carried, eye: Eye) -> Work:
+    """Work returning the eye part (n, 3) mm: the ball as ``carried`` takes it, the caruncle as ball and lids around it go.
 
     skin : (n, 3) mm, the fitted head's, with the lids in their places
     """
@@ -102,7 +103,7 @@ def eye_part(rest: "Rest", side: str, skin, carried, eye: Eye) -> np.ndarray:
     keep = thinned(source, 0.2)
     space = System(source[keep], 0.0).solve(np.concatenate([skin[lids], carried(vertices[ball])])[keep])
     faces = part.faces[part.faces.min(axis=1) >= BALL] - BALL
-    moved = cleared(Mesh(space.transform(flesh), faces), rest.head.skin.moved(skin), eye, CLOSE)
+    moved = yield from clearing(Mesh(space.transform(flesh), faces), rest.head.skin.moved(skin), eye, CLOSE)
     return np.concatenate([carried(vertices[:BALL]), moved])
 
 

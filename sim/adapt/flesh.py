@@ -9,6 +9,7 @@ from ..anatomy.head import Eye
 from ..mesh import Mesh, edges
 from ..mesh_piercing import piercings
 from ..mesh_subdivision import smoother
+from ..progress import Progress, Work, finish, portion
 from .closest import Surface
 from .lid_contact import height_over
 
@@ -21,7 +22,13 @@ SIZES = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4)
 
 
 def cleared(flesh: Mesh, skin: Mesh, eye: Eye, room: float = 1.0) -> np.ndarray:
-    """(k, 3) mm: the vertices of ``flesh`` moved off the ``skin``, cage and drawn surface, and off the ball of ``eye``.
+    """`clearing`, at once."""
+    return finish(clearing(flesh, skin, eye, room))
+
+
+def clearing(flesh: Mesh, skin: Mesh, eye: Eye, room: float = 1.0) -> Work:
+    """Work returning (k, 3) mm: the vertices of ``flesh`` moved off the ``skin``, cage and drawn surface, and off the ball
+    of ``eye``.
 
     room : share of the usual distances that is kept. Where there is too little space, the flesh shrinks toward its middle.
     """
@@ -33,19 +40,21 @@ def cleared(flesh: Mesh, skin: Mesh, eye: Eye, room: float = 1.0) -> np.ndarray:
         near.append((mesh.vertices, mesh.triangles[inside[mesh.triangles].any(axis=1)]))
         walls.append(Surface(*near[-1]))
     middle = flesh.vertices.mean(axis=0)
-    for share in SIZES:
-        out = _pushed(flesh.moved(middle + share * (flesh.vertices - middle)), walls, eye, room)
+    for k, share in enumerate(SIZES):
+        smaller = flesh.moved(middle + share * (flesh.vertices - middle))
+        out = yield from portion(_pushed(smaller, walls, eye, room), k / len(SIZES), (k + 1) / len(SIZES))
         if not any(len(piercings(*skin_near, out, flesh.triangles)) for skin_near in near):
             break
     return out
 
 
-def _pushed(flesh: Mesh, walls, eye: Eye, room: float) -> np.ndarray:
+def _pushed(flesh: Mesh, walls, eye: Eye, room: float) -> Work:
     start = flesh.vertices
     mean, samples = _mean(flesh), _samples(flesh)
     out = start.copy()
     for turn in range(ROUNDS):
         touched = False
+        yield Progress(turn / ROUNDS, "Corners of the eyes")
         for wall in walls:
             points = samples @ out
             found = wall.closest(points)

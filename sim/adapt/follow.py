@@ -13,9 +13,9 @@ from scipy.spatial import cKDTree
 
 from ..anatomy.head import Head
 from ..anatomy.tissue_depth import tissue_vectors
-from ..progress import Progress, Work
+from ..progress import Progress, Work, portion
 from . import bone, eyeballs
-from .bone_inside import keep_inside
+from .bone_inside import keeping_inside
 from .lining import lined, lips_met, lips_parted
 from .mouth import mouth_similarity, with_teeth
 from .muscles import carried_muscles
@@ -23,7 +23,7 @@ from .rest import BONES, TEETH, Rest, rest_of
 from .skin_cover import SkinCover
 from .skin_fit import group
 from .thin_plate_spline import similarity
-from .untangle import restored, untangled
+from .untangle import restored, untangling
 
 AROUND_EYE = 32.0  # mm: bone this near carries the eye
 
@@ -85,27 +85,30 @@ def follow(reference: Head, skin: np.ndarray, unseen: np.ndarray | None = None) 
     lining = np.maximum(group(reference, "lip_upper"), group(reference, "lip_lower")) > 0.3
     shut = rest.rim & lining  # where lips meet is seen, a fold behind them is not
     final = restored(rest, final, unseen, scale)
-    final = untangled(rest, final, seen & ~unseen, shut)
+    final = yield from portion(untangling(rest, final, seen & ~unseen, shut), 0.45, 0.55)
     final = lips_parted(rest, final, size)
     for eye, side in zip(eyes, "lr", strict=True):
         final = eyeballs.settled_lids(rest, final, eye, side)
     parts["skin"] = final
-    for eye, side in zip(eyes, "lr", strict=True):
+    for k, (eye, side) in enumerate(zip(eyes, "lr", strict=True)):
         part = f"eye_{side}"
-        parts[part] = eyeballs.eye_part(rest, side, final, carried[part], eye)
+        work = eyeballs.eye_part(rest, side, final, carried[part], eye)
+        parts[part] = yield from portion(work, 0.55 + 0.03 * k, 0.58 + 0.03 * k)
 
-    yield Progress(0.5, "Bone under the skin")
+    yield Progress(0.61, "Bone under the skin")
     cover = SkinCover(reference.skin.moved(final), group(reference, "inner"), bone.LINING)
     moved = 0.0
-    for name in BONES:
+    for k, name in enumerate(BONES):
         before = parts[name]
         least = np.maximum(rest.needs[name] * min(scale, 1.0), bone.LEAST)
-        parts[name] = keep_inside(reference.parts[name].moved(before), cover, least)
+        work = keeping_inside(reference.parts[name].moved(before), cover, least)
+        parts[name] = yield from portion(work, 0.62 + 0.18 * k / len(BONES), 0.62 + 0.18 * (k + 1) / len(BONES))
         moved = max(moved, float(np.linalg.norm(parts[name] - before, axis=1).max()))
     jaw = carried_jaw(rest, parts, mouth, scale)
 
     yield Progress(0.8, "Muscles")
-    muscles = carried_muscles(rest, parts, eyes, rest.between(parts, final))
+    work = carried_muscles(rest, parts, eyes, rest.between(parts, final))
+    muscles = yield from portion(work, 0.8, 1.0)
     head = replace(reference.with_vertices(parts), muscles=muscles, jaw=jaw, eyes=tuple(eyes))
     return Followed(head, moved)
 

@@ -8,10 +8,11 @@ from scipy.sparse import coo_matrix, diags
 
 from ..anatomy.head import Muscle
 from ..anatomy.inside import inside
-from ..anatomy.muscle_bounds import eased
+from ..anatomy.muscle_bounds import easing
 from ..anatomy.muscle_room import Room
-from ..anatomy.muscle_shape import all_reshaped
+from ..anatomy.muscle_shape import reshaping
 from ..mesh import edges
+from ..progress import Progress, Work, portion
 from .bone import depth_under
 from .closest import Surface
 from .rest import BONES, Rest
@@ -21,32 +22,28 @@ UNDER = 0.1  # mm under skin and lining to which a belly that came out of them i
 LOST = 3.0  # mm: nothing comes out farther
 
 
-def carried_muscles(rest: Rest, parts, eyes, warp) -> tuple[Muscle, ...]:
-    """The reference's muscles sent through ``warp`` (`Rest.between`) and kept between skin and bone.
+def carried_muscles(rest: Rest, parts, eyes, warp) -> Work:
+    """Work returning the reference's muscles sent through ``warp`` (`Rest.between`) and kept between skin and bone.
 
     parts : name -> (n, 3) mm of skin and bones as they are now; eyes : the two `Eye`
     """
+    yield Progress(0.0, "Muscles")
     muscles, skin = rest.head.muscles, rest.head.skin.moved(parts["skin"])
     bones = [rest.head.parts[name].moved(parts[name]) for name in BONES]
     room = Room(skin, bones, rest.inner, [(eye.centre, eye.radius) for eye in eyes], mirrored=False)
     cuts = np.cumsum([m.fibres.size // 3 for m in muscles])[:-1]
     points = warp.transform(np.concatenate([m.fibres.reshape(-1, 3) for m in muscles]))
     fibres = [f.reshape(m.fibres.shape) for f, m in zip(np.split(points, cuts), muscles, strict=True)]
-    fibres = eased(
-        fibres,
-        [np.ones(f.shape[:2]) for f in fibres],
-        [np.full(f.shape[:2], CLEAR) for f in fibres],
-        [m.ring for m in muscles],
-        room,
-        rounds=5,
-        beside=0.25,
-    )
+    keep, clear = [np.ones(f.shape[:2]) for f in fibres], [np.full(f.shape[:2], CLEAR) for f in fibres]
+    rings = [m.ring for m in muscles]
+    fibres = yield from portion(easing(fibres, keep, clear, rings, room, rounds=5, beside=0.25), 0.05, 0.35)
     centres = [None if m.centre is None else warp.transform(m.centre[None])[0] for m in muscles]
-    return drawn_in(tuple(all_reshaped(muscles, fibres, room, centres)), skin)
+    bellies = yield from portion(reshaping(muscles, fibres, room, centres), 0.35, 0.8)
+    return (yield from portion(drawn_in(tuple(bellies), skin), 0.8, 1.0))
 
 
-def drawn_in(muscles: tuple[Muscle, ...], skin, rounds: int = 6) -> tuple[Muscle, ...]:
-    """``muscles`` with the last of their bellies drawn back under the skin and its linings (``skin``, a mesh).
+def drawn_in(muscles: tuple[Muscle, ...], skin, rounds: int = 6) -> Work:
+    """Work returning ``muscles`` with the last of their bellies drawn back under the skin and its linings (``skin``, a mesh).
 
     At the bottom of the narrow slits between lips and gums no normal tells inside from outside; the winding number does.
     What is out takes its neighbours along.
@@ -60,7 +57,8 @@ def drawn_in(muscles: tuple[Muscle, ...], skin, rounds: int = 6) -> tuple[Muscle
     link = link.tocsr()
     mean = diags(1 / np.maximum(np.asarray(link.sum(axis=1)).ravel(), 1)) @ link
     ask = np.arange(len(at))
-    for _ in range(rounds):
+    for turn in range(rounds):
+        yield Progress(turn / rounds, "Muscles")
         depth, found = depth_under(at[ask], surface, LOST)
         out = np.flatnonzero(depth < 0)
         out = out[~inside(at[ask[out]], skin.vertices, skin.triangles)]

@@ -12,6 +12,7 @@ from scipy.sparse.csgraph import connected_components
 
 from ..mesh_piercing import self_piercings
 from ..mesh_subdivision import drawn
+from ..progress import Progress, Work, finish
 from .smooth_system import factorised
 from .thin_plate_spline import similarity
 
@@ -48,7 +49,13 @@ def tangled(vertices, triangles, allowed=frozenset(), among=None):
 
 
 def untangled(rest: "Rest", vertices, visible, hold=None, rounds: int = 6):
-    """The vertices (n, 3) with tangles smoothed away, of the surface drawn, and of its cage where that is not seen.
+    """`untangling`, at once."""
+    return finish(untangling(rest, vertices, visible, hold, rounds))
+
+
+def untangling(rest: "Rest", vertices, visible, hold=None, rounds: int = 6) -> Work:
+    """Work returning the vertices (n, 3) with tangles smoothed away, of the surface drawn, and of its cage where that is
+    not seen.
 
     Parameters
     ----------
@@ -62,7 +69,9 @@ def untangled(rest: "Rest", vertices, visible, hold=None, rounds: int = 6):
     hidden = ~visible[triangles].all(axis=1)
     best, fewest, among = out, None, None
     for turn in range(rounds):
+        yield Progress(turn / rounds, "Untangle the skin")
         wrong = tangled(drawn(rest.head.skin.faces, out), triangles, rest.folds, among)
+        yield Progress((turn + 0.4) / rounds, "Untangle the skin")
         pairs = self_piercings(out, triangles, among)
         wrong[triangles[pairs[hidden[pairs].all(axis=1)].ravel()].ravel()] = True
         if hold is not None:
@@ -78,6 +87,7 @@ def untangled(rest: "Rest", vertices, visible, hold=None, rounds: int = 6):
         if hold is not None:
             patch &= ~hold
         among = patch[triangles].any(axis=1)
+        yield Progress((turn + 0.8) / rounds, "Untangle the skin")
         out = np.array(vertices, dtype=float)
         _fill_all(rest, out, patch)
     # A patch that would change the likeness more than its tangle does, stays as it was.

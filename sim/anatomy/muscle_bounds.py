@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..progress import Progress, Work, finish, portion
 from .muscle_room import FAR, Room
 
 #: mm of belly that is left where there is no room at all.
@@ -43,7 +44,12 @@ class Belly:
 
 
 def bounded(bellies: list[Belly], room: Room, rounds: int = 4, floor=None, cover=0.0, strict=True) -> list[Belly]:
-    """``bellies`` moved and thinned along their normals until they lie in ``room``.
+    """`bounding`, at once."""
+    return finish(bounding(bellies, room, rounds, floor, cover, strict))
+
+
+def bounding(bellies: list[Belly], room: Room, rounds: int = 4, floor=None, cover=0.0, strict=True) -> Work:
+    """Work returning ``bellies`` moved and thinned along their normals until they lie in ``room``.
 
     floor : callable(points (n, 3), ways (n, 3)) -> (n,) mm by which points must rise to clear what lies deeper
     (negative: they need not), or None; cover : mm left free over the upper side; strict : nothing may stay
@@ -64,7 +70,8 @@ def bounded(bellies: list[Belly], room: Room, rounds: int = 4, floor=None, cover
     thick = np.einsum("nj,nj->n", start[0] - start[1], ways)
     # heights of both sides over the middle of the belly as it came
     top, low = thick / 2, -thick / 2
-    for _ in range(rounds):
+    for turn in range(rounds):
+        yield Progress(0.5 * turn / rounds, "Muscles")
         points = [start[0] + (top - thick / 2)[:, None] * ways, start[1] + (low + thick / 2)[:, None] * ways]
         least, most = room.span(np.concatenate(points), np.concatenate([ways, ways]))
         n = len(ways)
@@ -82,7 +89,7 @@ def bounded(bellies: list[Belly], room: Room, rounds: int = 4, floor=None, cover
     # what is left in a wall stands beside it or has no room at all: it gives way with its neighbours
     both = [side for pair in zip(*sides, strict=True) for side in pair]
     rings = [b.ring for b in bellies for _ in (0, 1)]
-    both = eased(both, None, None, rings, room, rounds=6, wide=2)
+    both = yield from portion(easing(both, None, None, rings, room, rounds=6, wide=2), 0.5, 1.0)
     return [Belly(t, w, b.normal, b.ring, b.free) for t, w, b in zip(both[::2], both[1::2], bellies, strict=True)]
 
 
@@ -158,7 +165,14 @@ def sheet_normals(sheet, ring):
 
 
 def eased(fibres: list[np.ndarray], keep, clear, rings, room: Room, rounds: int = 12, beside=1.0, wide: int = 1):
-    """Fibres, each (f, p, 3) mm, bent out of the walls of ``room`` by smooth displacements.
+    """`easing`, at once."""
+    return finish(easing(fibres, keep, clear, rings, room, rounds, beside, wide))
+
+
+def easing(
+    fibres: list[np.ndarray], keep, clear, rings, room: Room, rounds: int = 12, beside=1.0, wide: int = 1
+) -> Work:
+    """Work returning fibres, each (f, p, 3) mm, bent out of the walls of ``room`` by smooth displacements.
 
     keep : each (f, p) 0..1, how free a point is (None: wholly); clear : each (f, p) mm to keep from every wall (None:
     0); beside : share of a displacement that may slide the fibres along their own sheet; wide : neighbours that go along
@@ -173,11 +187,13 @@ def eased(fibres: list[np.ndarray], keep, clear, rings, room: Room, rounds: int 
     normal = np.concatenate([sheet_normals(f, ring).reshape(-1, 3) for f, ring in zip(fibres, rings, strict=True)])
     reach = float(wanted.max(initial=0.0)) + 2 * NEAR
     slack = np.zeros(len(at))
-    for _ in range(rounds):
+    for turn in range(rounds):
+        yield Progress(turn / rounds, "Muscles")
         push = np.zeros_like(at)
         ask = np.flatnonzero(slack < 0.1)  # the others were farther from walls than they have moved since
         slack[ask] = reach - NEAR
         for distance, away in room.walls(at[ask], reach):
+            yield Progress((turn + 0.5) / rounds, "Muscles")
             lack = wanted[ask] - distance
             slack[ask] = np.minimum(slack[ask], -lack)
             push[ask] += np.clip(lack, 0, 2.0)[:, None] * away

@@ -12,8 +12,9 @@ from dataclasses import replace
 import numpy as np
 
 from ..mesh import Mesh
+from ..progress import Work, finish
 from .head import Muscle
-from .muscle_bounds import Belly, bounded, sheet_normals
+from .muscle_bounds import Belly, bounded, bounding, sheet_normals
 from .muscle_room import Room
 
 #: Share of the belly's thickness at even stations from origin to insertion, where nothing else is asked for.
@@ -63,12 +64,17 @@ def reshaped(muscle: Muscle, fibres: np.ndarray, room: Room | None = None, centr
 
 
 def all_reshaped(muscles, fibres, room: Room | None = None, centres=None) -> list[Muscle]:
-    """`reshaped` for many muscles at once, which is quicker; ``centres`` may hold None where one stays."""
+    """`reshaping`, at once."""
+    return finish(reshaping(muscles, fibres, room, centres))
+
+
+def reshaping(muscles, fibres, room: Room | None = None, centres=None) -> Work:
+    """Work returning `reshaped` for many muscles at once, which is quicker; ``centres`` may hold None where one stays."""
     centres = [None] * len(muscles) if centres is None else centres
     grown = [_growth(m, np.asarray(f, dtype=float)) for m, f in zip(muscles, fibres, strict=True)]
     bellies = [_carried(m, np.asarray(f, dtype=float), g) for m, f, g in zip(muscles, fibres, grown, strict=True)]
     if room is not None:
-        bellies = bounded(bellies, room)
+        bellies = yield from bounding(bellies, room)
     return [
         replace(
             muscle,
