@@ -8,6 +8,7 @@ import bpy
 
 from ..sim.detail.detail_map import DetailMaps
 from ..sim.detail.files import displacement_png, normal_png
+from ..sim.progress import Progress, Work, finish
 from . import heads
 from .detail_nodes import DetailImages, use_detail
 
@@ -20,8 +21,14 @@ IMAGES = {
 
 def write_images(skin: bpy.types.Object, maps: DetailMaps) -> DetailImages:
     """Keep the maps with the head as packed 16-bit images, in place of earlier ones."""
-    contents = (displacement_png(maps), normal_png(maps))
-    for (key, (title, _)), data in zip(IMAGES.items(), contents, strict=True):
+    return finish(packing(skin, maps))
+
+
+def packing(skin: bpy.types.Object, maps: DetailMaps) -> Work:
+    """`write_images` as work with progress."""
+    for number, (key, (title, _)) in enumerate(IMAGES.items()):
+        yield Progress(number / len(IMAGES), "Packing the detail maps")
+        data = (displacement_png, normal_png)[number](maps)
         image = _packed(f"{heads.head_name(skin)} {title}", data)
         old = skin.get(key)
         skin[key] = image

@@ -13,10 +13,10 @@ from ..sim.detail.maps import SIZE
 from ..sim.landmarks.find import find_landmarks
 from ..sim.mesh import Mesh
 from ..sim.progress import Progress, Work, portion
-from ..sim.scan.clean import clean_scan
+from ..sim.scan.clean import cleaning
 from ..sim.scan.orientation import Orientation, detect, plausible_units
 from . import bridge, heads, shape_keys
-from .detail_images import write_images
+from .detail_images import packing
 from .materials import dressing
 from .provenance import timed, versions
 from .scan_import import datablocks, read_scan
@@ -56,8 +56,7 @@ def load_scan(path, landmarks: dict | None = None, unit: str | None = None, up: 
 
 def prepare_scan(raw: Mesh, landmarks=None, unit=None, up=None, seconds=None) -> Work:
     """Work that cleans a mesh in any unit and axes and brings it to mm, Z up, face toward -Y; see `load_scan`."""
-    yield Progress(0.0, "Cleaning the scan")
-    mesh, counts = clean_scan(raw)
+    mesh, counts = yield from portion(cleaning(raw), 0.0, 0.5)
     yield Progress(0.5, "Finding out which way is up")
     return _upright(mesh, counts, detect(mesh, landmarks, unit=unit, up=up), seconds)
 
@@ -87,9 +86,8 @@ def load_scan_alone(path, unit: str | None = None, up: str | None = None) -> Wor
     yield Progress(0.0, "Reading the scan")
     with timed(seconds, "read"):
         raw = read_scan(path)
-    yield Progress(0.02, "Cleaning the scan")
     with timed(seconds, "clean"):
-        mesh, counts = clean_scan(raw)
+        mesh, counts = yield from portion(cleaning(raw), 0.02, 0.05)
     with timed(seconds, "landmarks"):
         scales = plausible_units(mesh, unit)
         found = yield from portion(find_landmarks(mesh, unit_scales=list(scales.values())), 0.05, 1.0)
@@ -152,8 +150,7 @@ def build(
         if result.scanned is not None:
             shape_keys.keep_as_scanned(skin, result.scanned)
         if result.detail is not None:
-            yield Progress(0.92, "Packing the detail maps")
-            write_images(skin, result.detail)
+            yield from portion(packing(skin, result.detail), 0.92, 0.94)
         yield from portion(dressing(skin), 0.94, 1.0)
     heads.write_report(skin, report)
     return skin, report

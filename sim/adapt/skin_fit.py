@@ -77,6 +77,7 @@ def fit_skin(reference: Head, target: Surface, given: dict[str, np.ndarray]) -> 
 
     It is the surface drawn of the skin, the limit of its subdivision, that is laid on the scan.
     """
+    yield Progress(0.0, "Looking at lids and lips")
     lips_closed, closed = as_scanned(reference, given)
     whole, given, lips = with_lips_as_scanned(lips_closed, target, given)
     reference = whole.with_vertices({"skin": drawn(whole.skin.faces, whole.skin.vertices)})

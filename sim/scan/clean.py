@@ -9,6 +9,7 @@ from scipy.sparse.csgraph import connected_components
 
 from ..errors import InputError
 from ..mesh import Mesh
+from ..progress import Progress, Work, finish
 
 #: Fewer triangles than this are no head.
 FEWEST_TRIANGLES = 100
@@ -19,9 +20,14 @@ FLAT = 1e-7
 
 
 def clean_scan(mesh: Mesh) -> tuple[Mesh, dict]:
-    """A triangle mesh without NaN vertices, zero-area and duplicate faces and unused vertices; coincident ones welded.
+    """`cleaning`, at once."""
+    return finish(cleaning(mesh))
 
-    Returns the mesh (colours kept: the mean of those welded) and counts: ``vertices``, ``triangles``, ``components`` of
+
+def cleaning(mesh: Mesh) -> Work:
+    """Work returning a triangle mesh without NaN vertices, zero-area, duplicate faces and unused vertices; equal ones welded.
+
+    It returns the mesh (colours kept: the mean of those welded) and counts: ``vertices``, ``triangles``, ``components`` of
     the result, and what was removed: ``nonfinite_vertices``, ``nonfinite_faces``, ``welded_vertices``,
     ``zero_area_faces``, ``duplicate_faces``, ``unused_vertices``.
 
@@ -29,6 +35,7 @@ def clean_scan(mesh: Mesh) -> tuple[Mesh, dict]:
     ------
     InputError : nothing usable is there: no faces, too few, too many, all NaN, all in one point or plane.
     """
+    yield Progress(0.0, "Cleaning the scan")
     points, triangles = mesh.vertices, mesh.triangles
     _refuse_hopeless(points, triangles)
     counts = {}
@@ -50,15 +57,20 @@ def clean_scan(mesh: Mesh) -> tuple[Mesh, dict]:
     points, triangles = points[kept], index[triangles]
     colour = None if mesh.colour is None else mesh.colour[kept]
 
+    yield Progress(0.15, "Cleaning the scan")
     same, count = _coincident(points)
+    yield Progress(0.4, "Cleaning the scan")
     counts["welded_vertices"] = len(points) - count
     points, colour = _merged(points, colour, same, count)
     triangles = same[triangles]
 
+    yield Progress(0.5, "Cleaning the scan")
     flat = _flat(points, triangles)
     counts["zero_area_faces"] = int(flat.sum())
     triangles = triangles[~flat]
+    yield Progress(0.6, "Cleaning the scan")
     again = _repeated(triangles)
+    yield Progress(0.85, "Cleaning the scan")
     counts["duplicate_faces"] = int(again.sum())
     triangles = triangles[~again]
 
@@ -72,6 +84,7 @@ def clean_scan(mesh: Mesh) -> tuple[Mesh, dict]:
             f"Only {len(triangles)} usable triangles are left of the scan, too few for a head: choose another file."
         )
     _refuse_flat(points)
+    yield Progress(0.9, "Cleaning the scan")
     counts |= {
         "vertices": len(points),
         "triangles": len(triangles),
