@@ -40,7 +40,7 @@ def parser() -> argparse.ArgumentParser:
     chosen.add_argument("head", metavar="HEAD.blend", help="a file that headshop build or the add-on made")
     chosen.add_argument("--head", dest="name", metavar="NAME", help="which head, if the file holds several")
     reading = argparse.ArgumentParser(add_help=False)
-    reading.add_argument("scan", metavar="SCAN", help="PLY, OBJ, STL, glTF, USD or FBX")
+    reading.add_argument("scan", metavar="SCAN", help="PLY, OBJ, STL, glTF, USD, FBX, or a range map (ECH, NPZ, JSON)")
     reading.add_argument("--units", choices=("mm", "cm", "m", "in"), help="the scan's unit (default: detected)")
     up = "the scan's up axis: X, Y, Z or, written --up=-Z, one upside down (default: detected)"
     reading.add_argument("--up", choices=("X", "Y", "Z", "-X", "-Y", "-Z"), metavar="AXIS", help=up)

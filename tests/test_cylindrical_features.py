@@ -5,19 +5,26 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_matrix
 
+from headshop.sim.adapt.build import fit_report
 from headshop.sim.adapt.closest import Surface
 from headshop.sim.adapt.completion import sigma
+from headshop.sim.adapt.landmarks import read_landmarks
+from headshop.sim.adapt.skin_fit import fit_skin
 from headshop.sim.cylindrical.adaptation import adapt
-from headshop.sim.cylindrical.features import find_features
+from headshop.sim.cylindrical.features import VAGUE, find_features
+from headshop.sim.cylindrical.grid_mesh import to_mesh
 from headshop.sim.cylindrical.laplacian import edge_field, laplacian_field
+from headshop.sim.cylindrical.map_files import read_range_map, write_range_map
 from headshop.sim.cylindrical.pose import find_pose
 from headshop.sim.cylindrical.range_map import RangeMap, resample
 from headshop.sim.cylindrical.relaxation import filled, relaxed
 from headshop.sim.cylindrical.second_opinion import weighed
 from headshop.sim.cylindrical.springs import relax
+from headshop.sim.cylindrical.unroll import unrolled
 from headshop.sim.errors import InputError
 from headshop.sim.mesh import Mesh, vertex_normals
 from headshop.sim.progress import finish
+from headshop.sim.scan.ply import read_ply
 
 
 def around(radius, colour=None):
@@ -206,3 +213,17 @@ def test_landmarks_that_are_off_are_drawn_to_the_features_of_the_map(reference, 
     assert surface.closest(np.array(list(better.values()))).distance.max() < 1e-6
     few = {n: off[n] for n in ("prn", "ex_l", "ex_r")}
     assert finish(weighed(mesh, few, dict.fromkeys(few, 1.0), reference, surface)) is few
+
+
+def test_a_scanners_patch_is_fitted_from_its_own_map_alone(reference, shared, tmp_path):
+    scan = read_ply(shared / "scans" / "fran_cyberware.ply")
+    write_range_map(tmp_path / "patch.ech", unrolled(scan))  # 49 x 45 texels, colours beside
+    made = read_range_map(tmp_path / "patch.ech")
+    found = finish(find_features(made, reference))
+    true = read_landmarks(shared / "scans" / "fran_cyberware.landmarks.json")
+    assert np.mean([np.linalg.norm(found.positions[n] - p) for n, p in true.items()]) < 5.5
+    sure = {n: p for n, p in found.positions.items() if n not in found.in_void and n not in VAGUE}
+    mesh = to_mesh(made)
+    fit = finish(fit_skin(reference, Surface(mesh.vertices, mesh.triangles, smooth=2.0), sure))
+    report = fit_report(reference, fit, sure)
+    assert report["mean_mm"] < 0.3 and report["p95_mm"] < 1.0 and report["coverage"] > 0.75

@@ -102,6 +102,16 @@ def test_holes_and_jumps_of_a_map_are_holes_of_the_mesh():
     assert len(to_mesh(made.__class__(**{**vars(made), "radius": step}), tear=None).faces) == len(holed.faces)
 
 
+def test_unknown_colours_are_relaxed_from_those_around():
+    made = resample(tent(3), 64, 32, origin=np.zeros(3), span=(-40, 40))
+    made.colour[...] = np.linspace(0.2, 0.6, 32)[:, None, None]
+    made.colour[12:18, 20:26] = np.nan
+    mesh = to_mesh(made)
+    assert np.isfinite(mesh.colour).all()
+    expected = np.interp(mesh.vertices[:, 2], made.heights[::-1], np.linspace(0.6, 0.2, 32))
+    np.testing.assert_allclose(mesh.colour[:, 0], expected, atol=0.02)
+
+
 def test_an_unrolled_map_is_recovered_and_other_meshes_are_none(reference):
     rng = np.random.default_rng(2)
     made = replace(resample(tent(3), 90, 40, origin=[1.0, 2, 3], span=(-50, 60)), first=-0.6, step=0.03)

@@ -5,6 +5,7 @@ import numpy as np
 
 from ..mesh import Mesh
 from .range_map import RangeMap
+from .relaxation import relaxed
 
 #: Rise of the radius over the distance of neighbouring texels above which there is no surface between them.
 TEAR = 9.0
@@ -14,7 +15,7 @@ def to_mesh(range_map: RangeMap, tear: float | None = TEAR) -> Mesh:
     """One vertex per valid texel that is in a face; squares of texels as quads, three valid corners as a triangle.
 
     tear : faces steeper than this (rise over run, seen from the axis) are left out; None keeps them all. Positions in
-    mm in the scan's place, wound to face outward; colours where the map has them (grey where they are unknown).
+    mm in the scan's place, wound to face outward; colours if the map has them, relaxed where they are unknown.
     """
     h, w = range_map.shape
     points, valid = range_map.points(), range_map.valid
@@ -45,9 +46,20 @@ def to_mesh(range_map: RangeMap, tear: float | None = TEAR) -> Mesh:
     index = np.cumsum(used) - 1
     colour = None
     if range_map.colour is not None:
-        colour = range_map.colour.reshape(-1, 3)[used]
-        colour = np.where(np.isfinite(colour), colour, np.float32(0.5))
+        colour = _known_colours(range_map).reshape(-1, 3)[used]
     return Mesh(points.reshape(-1, 3)[used], np.where(faces >= 0, index[faces], -1).astype(np.int32), colour=colour)
+
+
+def _known_colours(range_map: RangeMap) -> np.ndarray:
+    """(h, w, 3) colours without gaps where there is range: relaxed from those around (Lee et al. 1995, section 2.1)."""
+    colour = range_map.colour
+    known = np.isfinite(colour).all(axis=2)
+    if known[range_map.valid].all():
+        return np.where(np.isfinite(colour), colour, np.float32(0.5))
+    if not known.any():
+        return np.full(colour.shape, 0.5, dtype=np.float32)
+    spacing = (float(np.nanmedian(range_map.radius)) * range_map.step, range_map.rise)
+    return relaxed(colour, known, range_map.closed, 1.0, spacing).clip(0, 1).astype(np.float32)
 
 
 def _split_short(quads, points):
