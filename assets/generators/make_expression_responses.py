@@ -11,12 +11,13 @@ import numpy as np
 
 from ...sim.acting.pose import Pose, control
 from ...sim.anatomy.storage import REFERENCE, load_head, write_atomically
-from ...sim.relax.bunching import swelling
+from ...sim.relax.bunching import borne, swelling
 from ...sim.relax.responses import MUSCLES, OPENINGS, TABLE, UNPAIRED, mirrored_vertices
 from ...sim.tissue.model import build_model
 from ...sim.tissue.solver import rest_state, solve
 
 ITERATIONS = 300
+BROW = "orbicularis_oculi_orbital"  # what raises cheeks is its lower half, which acts alone; its upper lowers brows
 STILL = 0.02  # mm: what moves less stays, so that the table packs well
 
 
@@ -28,12 +29,13 @@ def main(argv: list[str]) -> int:
 
     def moved(pose):
         field = solve(model, control(model, pose), max_iterations=ITERATIONS).state.skin - rest
-        field += swelling(head, field)
+        field = borne(head, field) + swelling(head, field)
         field[np.linalg.norm(field, axis=1) < STILL] = 0
         return field
 
     jaw = [moved(Pose(jaw_open=opening)) for opening in OPENINGS]
     muscles = [moved(Pose({name if name in UNPAIRED else f"{name}_l": 1.0})) for name in MUSCLES]
+    muscles[MUSCLES.index(BROW)] *= below_eyes(head)[:, None]
     stream = io.BytesIO()
     np.savez_compressed(
         stream,
@@ -43,6 +45,13 @@ def main(argv: list[str]) -> int:
     )
     write_atomically(argv[0] if argv else TABLE, stream.getvalue())
     return 0
+
+
+def below_eyes(head) -> np.ndarray:
+    """(n,) 1 on the skin below the outer corners of the eyes, 0 from half the eye's width above them on."""
+    marks = head.landmark_positions()
+    rise = (head.skin.vertices[:, 2] - marks["ex_l"][2]) / (np.linalg.norm(marks["ex_l"] - marks["en_l"]) / 2)
+    return 1 - np.clip(rise, 0, 1)
 
 
 if __name__ == "__main__":

@@ -18,6 +18,14 @@ ROUNDS = 30  # smoothing steps: flesh spreads what presses it over about its own
 LEAVES = ("inner", "lip_upper", "lip_lower", "nose", "neck", "scalp", "forehead")
 
 
+def borne(head: Head, displacement) -> np.ndarray:
+    """The displacement (n, 3) mm without what lets the cheeks sink: flesh and teeth behind them bear them."""
+    normals = vertex_normals(head.skin.vertices, head.skin.triangles)
+    cheek = np.maximum(head.groups["cheek_l"], head.groups["cheek_r"]).astype(float)
+    sinking = np.minimum(np.einsum("ij,ij->i", displacement, normals), 0)
+    return displacement - (cheek * sinking)[:, None] * normals
+
+
 def swelling(head: Head, displacement) -> np.ndarray:
     """(n, 3) mm by which the flesh under a displaced skin, ``displacement`` (n, 3) mm, moves it out or lets it sink."""
     vertices, triangles = head.skin.vertices, head.skin.triangles

@@ -21,13 +21,14 @@ from scipy.spatial.distance import cdist
 from ..acting.expressions import expressions
 from .responses import Responses
 
-NOISE = 0.3  # mm
 OPEN = 0.5  # opening of the jaw that shrinkage expects
-SMILE = 1.0  # strength of a smile, by the joy of the table of expressions, that it expects
-ALONE = 0.3  # contraction of a muscle beyond its share in the smile
+SMILE = 2.0  # strength of a smile, by the joy of the table of expressions, that it expects
+ALONE = 0.8  # contraction of a muscle beyond its share in the smile
 UNEVEN = 0.15  # difference between the sides
-#: What our muscles do otherwise than a person's: share of what they do, and its reach in mm.
-UNLIKE, REACH = 0.35, 16.0
+#: What our muscles do otherwise than a person's: share of what they do, and
+#: its reaches in mm with their shares of the variance.
+UNLIKE = 0.6
+REACHES = ((16.0, 0.5), (6.0, 0.5))
 LEAST = 0.4  # mm of the same where little moves, at the mouth
 ROUNDS = 3
 
@@ -43,7 +44,7 @@ class Expression:
     modelled: np.ndarray
 
 
-def explain(table: Responses, vertices, sampling, offsets, people, names=None, noise=NOISE) -> Expression:
+def explain(table: Responses, vertices, sampling, offsets, people, noise, names=None) -> Expression:
     """The `Expression` of a face.
 
     Parameters
@@ -63,7 +64,7 @@ def explain(table: Responses, vertices, sampling, offsets, people, names=None, n
     # The lips touch, but what moves one does not move the other: distances are those of an open mouth.
     parted = vertices + table.jaw_at(0.35)
     places = sampling @ parted
-    alike = np.exp(-cdist(places, places, "sqeuclidean") / (2 * REACH**2))
+    alike = likeness(places, places)
     sampled = np.stack([(sampling @ field).ravel() for field in fields], axis=1)
     shrink = shrinkage([table.names[k] for k in pick])
     opening, contraction = 0.2, np.full(len(pick), 0.3)
@@ -83,9 +84,15 @@ def explain(table: Responses, vertices, sampling, offsets, people, names=None, n
     modelled = table.jaw_at(opening) + np.einsum("k,knj->nj", contraction, fields)
     left = y - jaw * opening - sampled @ contraction
     weights = cho_solve(factor, left).reshape(-1, 3)
-    across = np.exp(-cdist(parted, places, "sqeuclidean") / (2 * REACH**2)) * unlike[:, None] * error[None, :]
+    across = likeness(parted, places) * unlike[:, None] * error[None, :]
     muscles = {table.names[k]: float(a) for k, a in zip(pick, contraction, strict=True)}
     return Expression(opening, muscles, modelled + across @ weights, modelled)
+
+
+def likeness(a, b) -> np.ndarray:
+    """(j, k) correlation between points (j, 3) and (k, 3) mm of what muscles do otherwise."""
+    apart = cdist(a, b, "sqeuclidean")
+    return sum(share * np.exp(-apart / (2 * reach**2)) for reach, share in REACHES)
 
 
 def shrinkage(names) -> np.ndarray:

@@ -10,10 +10,11 @@ All else stays as scanned, down to its detail.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import csr_matrix
+from scipy.sparse import csr_matrix, vstack
 
 from ..adapt.refine import scattered
 from ..adapt.rest import rest_of
+from ..adapt.skin_fit import landmark_rows
 from ..adapt.thin_plate_spline import similarity
 from ..anatomy.head import Head
 from ..mesh_subdivision import drawn
@@ -23,13 +24,13 @@ from .parted import answers
 from .people import covariance
 from .responses import responses
 
-#: Skin that the muscles and jaw move by less holds the face in place, mm.
-UNMOVED = 0.25
-#: Points that are looked at: mm between them where an expression moves them by more than `BUSY` mm, and elsewhere.
-FINE, COARSE, BUSY = 9.0, 20.0, 2.0
-INVENTED = 4.0  # mm by which skin without data may be wrong
-TAKEN = 0.3  # mm by which skin with data may be
-NAMED = 3  # muscles that a report names
+#: Skin that the muscles and jaw move by less holds the face in place, mm; of it, points this far apart are looked at.
+UNMOVED, COARSE = 0.25, 30.0
+ROUND = 16.0  # mm between the points that are looked at on the cheeks
+NOISE = 1.0  # mm by which a landmark may be wrong
+UNSURE = 0.02  # trust in skin without data, of 1
+#: Landmarks that no expression moves much and that hair may hide; the middle of the mouth lies on no lip.
+LEFT_OUT = ("sto", "v", "op", "tr", *(f"{m}_{s}" for m in "go sa sba pra pa obs obi".split() for s in "lr"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,21 +54,22 @@ def relaxed(reference: Head, skin, fitted, unseen=None) -> Relaxed:
     if not answers(reference):
         raise ValueError("the table of responses belongs to another reference head")
     rest, table = rest_of(reference), responses()
-    start = drawn(reference.skin.faces, reference.skin.vertices)
-    now = drawn(reference.skin.faces, skin)
-    rows = sampled(rest, start, table.reach, unseen)
-    trust = np.asarray(fitted, dtype=float)[rows]
-    neck = np.asarray(reference.groups["neck"])[rows] > 0.2
-    still = (table.reach[rows] < UNMOVED) & ~neck
-    still = still * (trust + 0.02)
-    matrix, shift = similarity(start[rows], now[rows], still)
-    offsets = (now[rows] - shift) @ np.linalg.inv(matrix).T - start[rows]
-    people = covariance(reference.landmark_positions(), start[rows], still)
     n = len(skin)
-    sampling = csr_matrix((np.ones(len(rows)), (np.arange(len(rows)), rows)), shape=(len(rows), n))
-    noise = TAKEN + (INVENTED - TAKEN) * (1 - np.clip(2 * trust, 0, 1))
-    noise[rest.rim[rows]] = np.maximum(noise[rest.rim[rows]], 1.0)
-    found = explain(table, start, sampling, offsets, people, noise=noise)
+    start, now = (drawn(reference.skin.faces, cage) for cage in (reference.skin.vertices, skin))
+    far = unmoved(rest, start, table.reach, unseen)
+    still = np.asarray(fitted, dtype=float)[far] + UNSURE
+    matrix, shift = similarity(start[far], now[far], still)
+    names = [name for name in reference.landmarks.names if name not in LEFT_OUT]
+    rim = rest.lip_rim[::2]
+    rim = np.concatenate([rim, cheeks(rest, start)])
+    on_rim = csr_matrix((np.ones(len(rim)), (np.arange(len(rim)), rim)), shape=(len(rim), n))
+    sampling = vstack([landmark_rows(reference.landmarks, names, n), on_rim]).tocsr()
+    looked = sampling @ start
+    offsets = (sampling @ now - shift) @ np.linalg.inv(matrix).T - looked
+    weights = np.concatenate([np.zeros(len(looked)), still])
+    people = covariance(reference.landmark_positions(), np.concatenate([looked, start[far]]), weights)
+    people = people[: offsets.size, : offsets.size]
+    found = explain(table, start, sampling, offsets, people, NOISE)
     out = skin - found.displacement @ matrix.T
     gap = lip_gap(rest, skin)
     out = lips_closed(rest, out, matrix)
@@ -89,11 +91,17 @@ def lip_gap(rest, skin) -> float:
     return float(np.median(np.linalg.norm(skin[pairs[middle, 0]] - skin[pairs[middle, 1]], axis=1)))
 
 
-def sampled(rest, points, reach, unseen=None) -> np.ndarray:
-    """Indices (k,) of seen skin, close together where expressions move it."""
-    seen = ~rest.inner
+def unmoved(rest, points, reach, unseen=None) -> np.ndarray:
+    """Indices (k,) of seen skin of the head, evenly apart, that no expression moves."""
+    still = ~rest.inner & (reach < UNMOVED) & (np.asarray(rest.head.groups["neck"]) < 0.2)
     if unseen is not None:
-        seen &= ~unseen
-    busy, calm = np.flatnonzero(seen & (reach > BUSY)), np.flatnonzero(seen & (reach <= BUSY))
-    picked = np.concatenate([busy[scattered(points[busy], FINE)], calm[scattered(points[calm], COARSE)]])
-    return np.unique(np.concatenate([picked, rest.lip_rim]))
+        still &= ~unseen
+    rows = np.flatnonzero(still)
+    return rows[scattered(points[rows], COARSE)]
+
+
+def cheeks(rest, points) -> np.ndarray:
+    """Indices (k,) of the cheeks' skin, evenly apart: no landmark tells of it."""
+    cheek = np.maximum(rest.head.groups["cheek_l"], rest.head.groups["cheek_r"]) > 0.5
+    rows = np.flatnonzero(cheek & ~rest.inner)
+    return rows[scattered(points[rows], ROUND)]
