@@ -47,25 +47,48 @@ class BoxTree:
 
         points : (k, 3) mm
         """
+        square = np.asarray(reach, dtype=float) ** 2
+
+        def meets(planes, row, corner):
+            at = planes.take(row, axis=1)
+            gap = np.maximum(np.maximum(corner[:3] - at, at - corner[3:]), 0)
+            return gap[0] * gap[0] + gap[1] * gap[1] + gap[2] * gap[2] <= square[row]
+
+        return self._walked(np.ascontiguousarray(np.asarray(points, dtype=float).T), meets)
+
+    def along(self, origins, directions, reach):
+        """Pairs of a line ``origin + t direction``, -reach <= t <= reach, and a box that it meets: (p,) ascending, (p,).
+
+        origins, directions : (k, 3) mm, unit; reach : mm. Boxes that it only just misses may be among them.
+        """
+        ways = np.where(np.abs(directions) < 1e-12, 1e-12, directions)
+
+        def meets(planes, row, corner):
+            at, slow = planes[:3].take(row, axis=1), planes[3:].take(row, axis=1)
+            one, other = (corner[:3] - at) * slow, (corner[3:] - at) * slow
+            into, out = np.minimum(one, other).max(axis=0), np.maximum(one, other).min(axis=0)
+            there = corner[0] <= corner[3]  # not one of those that only fill the last level
+            return there & (into <= out + 1e-9) & (into <= reach) & (out >= -reach)
+
+        return self._walked(np.concatenate([np.asarray(origins, dtype=float).T, 1 / ways.T]), meets)
+
+    def _walked(self, planes, meets):
+        """Pairs (p,), (p,) of columns of ``planes`` (d, k) and boxes for which ``meets(planes, columns, corners)``."""
         found = [(np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64))]
-        for start in range(0, len(points), POINTS):
-            planes = np.ascontiguousarray(points[start : start + POINTS].T)
-            square = np.asarray(reach[start : start + POINTS]) ** 2
+        for start in range(0, planes.shape[1], POINTS):
+            stop = min(start + POINTS, planes.shape[1])
             level = min(ROOTS, self.depth)
-            row = np.repeat(np.arange(len(square)), 1 << level)
-            node = np.tile(np.arange(1 << level), len(square))
+            row = np.repeat(np.arange(start, stop), 1 << level)
+            node = np.tile(np.arange(1 << level), stop - start)
             while True:
-                corner, at = self._planes[level].take(node, axis=1), planes.take(row, axis=1)
-                gap = np.maximum(np.maximum(corner[:3] - at, at - corner[3:]), 0)
-                keep = np.flatnonzero(gap[0] * gap[0] + gap[1] * gap[1] + gap[2] * gap[2] <= square[row])
+                keep = np.flatnonzero(meets(planes, row, self._planes[level].take(node, axis=1)))
                 row, node = row[keep], node[keep]
                 if level == self.depth:
                     break
                 level += 1
-                row = np.repeat(row, 2)
-                node = np.repeat(2 * node, 2)
+                row, node = np.repeat(row, 2), np.repeat(2 * node, 2)
                 node[1::2] += 1
-            found.append((start + row, self.order[node]))
+            found.append((row, self.order[node]))
         first, second = (np.concatenate(x) for x in zip(*found, strict=True))
         return first, second
 

@@ -4,11 +4,13 @@
 import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
+from scipy.spatial.distance import cdist
 
 from headshop.sim import box_tree, triangle_projection
-from headshop.sim.adapt import closest
+from headshop.sim.adapt import closest, thin_plate_spline
 from headshop.sim.adapt.closest import Surface, least
 from headshop.sim.adapt.scan_surface import scan_surface
+from headshop.sim.adapt.thin_plate_spline import ThinPlateSpline
 from headshop.sim.mesh import Mesh
 from headshop.sim.triangle_projection import Triangles, closest_on_triangles
 
@@ -186,3 +188,33 @@ def test_boxes_near_points_are_all_found(monkeypatch):
         np.testing.assert_array_equal(sorted(zip(row.tolist(), box.tolist(), strict=True)), wanted)
         assert (np.diff(row) >= 0).all()
     assert len(box_tree.BoxTree(low, high).near(np.zeros((0, 3)), np.zeros(0))[0]) == 0
+
+
+def test_thousands_of_landmarks_are_warped_in_small_tables(monkeypatch):
+    rng = np.random.default_rng(8)
+    source, points = rng.normal(0, 60, (1500, 3)), rng.normal(0, 80, (4000, 3))
+    target = source + 5 * np.sin(source / 30)
+    whole = ThinPlateSpline.fit(source, target, 0.1).transform(points)
+    sizes = []
+
+    def recorded(a, b):
+        sizes.append(len(a) * len(b))
+        return cdist(a, b)
+
+    monkeypatch.setattr(thin_plate_spline, "cdist", recorded)
+    monkeypatch.setattr(thin_plate_spline, "BLOCK", 50_000)
+    warp = ThinPlateSpline.fit(source, target, 0.1)
+    np.testing.assert_allclose(warp.transform(points), whole, atol=1e-9)
+    assert max(sizes) <= 50_000 and sum(sizes) == 1500 * (1500 + 4000)
+
+
+def test_facing_tells_a_surface_from_one_turned(uneven):
+    surface, queries = uneven
+    out = queries[60:120]  # corners of it
+    facing = surface.facing(out, 20.0)
+    assert (
+        np.median(np.einsum("ij,ij->i", facing, out))
+        > 0
+        > np.median(np.einsum("ij,ij->i", surface.turned().facing(out, 20.0), out))
+    )
+    assert not surface.facing(out + 5000, 20.0).any()

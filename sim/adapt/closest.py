@@ -235,6 +235,14 @@ class Surface:
             pair = pair[np.concatenate([[True], pair[1:] != pair[:-1]])]
         return np.divmod(pair, len(self.triangles))
 
+    def facing(self, points, reach: float) -> np.ndarray:
+        """(k, 3) about the normal of what is near each of ``points`` (k, 3), zero where nothing is within ``reach`` mm."""
+        far, sample = self._cover.nearest(points, 1, reach)
+        found = np.isfinite(far[:, 0])
+        out = np.zeros((len(points), 3))
+        out[found] = self.face_normals[self._cover.owner[sample[found, 0]]]
+        return out
+
     def ranked(
         self, points, normals, reach: float, agreement: float = 0.5, near: int = 24, bend: float = 1.0
     ) -> Contacts:
@@ -268,8 +276,9 @@ class Surface:
             improve(row, cover.owner[sample[:, columns][row, column]], far[:, columns][row, column])
         doubt = np.flatnonzero((far[:, -1] - cover.most < best) & np.isfinite(far[:, -1]))
         if near > first and len(doubt):
+            seen = far[doubt, -1:]
             far, sample = cover.nearest(points[doubt], near, reach)
-            row, column = np.nonzero(np.isfinite(far))
+            row, column = np.nonzero(np.isfinite(far) & (far >= seen))
             improve(doubt[row], cover.owner[sample[row, column]], far[row, column])
         at = np.flatnonzero(triangle >= 0)
         return self._contacts(len(points), at, distance[at], triangle[at], weights[at])
@@ -281,13 +290,7 @@ class Surface:
         directions (k, 3) unit vectors.
         """
         origins, directions = np.asarray(origins, dtype=float), np.asarray(directions, dtype=float)
-        cover = self._cover
-        step = max(2 * cover.most, reach / 16)
-        stations = np.arange(-reach, reach + step, step)
-        ball = float(np.hypot(step / 2, cover.most) + cover.most)
-        at = (origins[:, None] + stations[None, :, None] * directions[:, None]).reshape(-1, 3)
-        station, sample, _ = cover.within(at, ball)
-        line, owner = self._once(station // len(stations), cover.owner[sample])
+        line, owner = self._once(*self._boxes.along(origins, directions, reach))
         a, ab = self.corners[owner, 0], self.corners[owner, 1] - self.corners[owner, 0]
         ac, d, o = self.corners[owner, 2] - a, directions[line], origins[line]
         p = np.cross(d, ac)

@@ -7,6 +7,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 SAMPLES = 160_000  # a finer cover does not pay for the time its tree takes
+MANY = 1000  # points from which on all cores search
 FEW = 30_000  # triangles; finer than they are where there are no more: less to try for each query
 
 
@@ -29,7 +30,8 @@ class Cover:
         Infinite where no triangle within ``reach`` mm has another.
         """
         count = min(count, self._tree.n)
-        far, sample = self._tree.query(points, k=count, distance_upper_bound=reach + self.most)
+        cores = -1 if len(points) >= MANY else 1
+        far, sample = self._tree.query(points, k=count, distance_upper_bound=reach + self.most, workers=cores)
         return far.reshape(len(points), -1), sample.reshape(len(points), -1)
 
     def within(self, points, reach):

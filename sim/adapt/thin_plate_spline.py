@@ -119,11 +119,15 @@ class ThinPlateSpline:
         flat = points.reshape(-1, 3)
         out = flat @ self.matrix.T + self.shift
         if self.weights.any():
-            step = max(1, BLOCK // max(len(self.centres), 1))
-            for start in range(0, len(flat), step):
-                part = slice(start, start + step)
+            for part in blocks(len(flat), len(self.centres)):
                 out[part] += cdist(flat[part], self.centres) @ self.weights
         return out.reshape(points.shape)
+
+
+def blocks(rows: int, columns: int):
+    """Slices of ``rows`` that make tables of at most `BLOCK` entries, or of one row."""
+    step = max(1, BLOCK // max(columns, 1))
+    return [slice(start, min(start + step, rows)) for start in range(0, rows, step)]
 
 
 class System:
@@ -139,8 +143,9 @@ class System:
         # Solved in units of the landmarks' own size: the system stays well conditioned in metres and millimetres.
         self._size = float(np.linalg.norm(self.source - self._centre, axis=1).max())
         p = (self.source - self._centre) / self._size
-        system = np.zeros((n + 4, n + 4))
-        system[:n, :n] = cdist(p, p)
+        system = np.zeros((n + 4, n + 4), order="F")  # the order in which LU needs no copy
+        for part in blocks(n, n):
+            system[:n, part] = cdist(p, p[part])
         system[np.arange(n), np.arange(n)] -= np.broadcast_to(smoothing, n) / self._size
         system[:n, n : n + 3] = p
         system[n : n + 3, :n] = p.T

@@ -15,7 +15,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve, solve_triangular
-from scipy.optimize import nnls
 from scipy.spatial.distance import cdist
 
 from ..acting.expressions import expressions
@@ -57,6 +56,8 @@ def explain(table: Responses, vertices, sampling, offsets, people, noise, names=
     names : the muscles to consider (all of the table by default)
     noise : mm, one or (k,), by which points may be wrong
     """
+    from scipy.optimize import nnls  # slow to load, and few scans have an open mouth
+
     pick = [k for k, name in enumerate(table.names) if names is None or name in names]
     fields = table.fields[pick]
     y = np.asarray(offsets, dtype=float).ravel()
