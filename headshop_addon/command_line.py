@@ -69,6 +69,7 @@ def parser() -> argparse.ArgumentParser:
     bake.add_argument("-o", "--output", metavar="OUT.blend", help="(default: HEAD.blend itself)")
 
     render = command("render", "Render a contact sheet or an animation.", chosen)
+    render.add_argument("--fit", action="store_true", help="the distance from the scan as a heat map (PNG)")
     render.add_argument("-o", "--output", required=True, metavar="SHEET.png|MOVIE.mp4")
 
     export = command("export", "Write an engine-ready copy: no modifiers, exact names.", chosen)

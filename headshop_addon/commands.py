@@ -98,15 +98,18 @@ def bake(options) -> None:
 def render(options) -> None:
     """A contact sheet or a movie."""
     _require_head_file(options.head)
-    kind = _require_kind(options.output, _PICTURES)
+    kind = _require_kind(options.output, _PICTURES[:1] if options.fit else _PICTURES)
     with Outputs() as outputs:
         picture = outputs.file(options.output)
         skin = _open(options)
-        _wake_cycles()
-        if kind == ".png":
+        if options.fit:
+            from .heat_sheet import render_fit as render_it
+        elif kind == ".png":
             from .contact_sheet import render_sheet as render_it
         else:
             from .movie import render_movie as render_it
+        if not options.fit:
+            _wake_cycles()
         _run(render_it(skin, picture), options)
     if not options.quiet:
         print(options.output)

@@ -145,3 +145,55 @@ def test_new_maps_take_the_place_of_old_ones(addon, skin):
     nodes = skin.data.materials[0].node_tree.nodes
     assert nodes["Head Shop Normal Map Image"].image == detail.normal and tuple(detail.normal.size) == (16, 16)
     assert nodes["Head Shop Displacement Image"].image == detail.displacement
+
+
+def test_the_heat_map_as_a_picture(addon, skin, reference, tmp_path, capfd):
+    from headshop.headshop_addon import heads, pictures
+    from headshop.headshop_addon.command_line import main
+    from headshop.headshop_addon.heat_sheet import FOOT, HEAD, HEIGHT, WIDTH, render_fit
+    from headshop.sim.errors import InputError
+    from headshop.sim.progress import finish
+
+    steps = []
+    finish(render_fit(skin, tmp_path / "fit.png", limit=0.25), steps.append)
+    page = pictures.read_picture(tmp_path / "fit.png")
+    assert page.shape[:2] == (HEAD + HEIGHT + FOOT, 3 * WIDTH) and len(steps) == 4
+    front = page[HEAD : HEAD + HEIGHT, WIDTH : 2 * WIDTH, :3]
+    red = (front[..., 0] > front[..., 2] + 0.15).mean(axis=0)
+    assert red[WIDTH // 2 :].sum() > 20 * red[: WIDTH // 2].sum(), "the subject's left is outside by the whole scale"
+    heads.create_head(reference, "Bea")
+    bare = next(obj for obj in heads.find_heads() if obj != skin)
+    with pytest.raises(InputError, match="was not fitted"):
+        finish(render_fit(bare, tmp_path / "none.png"))
+    assert not (tmp_path / "none.png").exists()
+    (tmp_path / "a.blend").write_bytes(b"anything")
+    assert main(["render", str(tmp_path / "a.blend"), "--fit", "-o", str(tmp_path / "a.mp4")]) == 2
+    assert "must end in .png" in capfd.readouterr().err
+
+
+def test_a_cancelled_build_leaves_the_file_as_it_was(addon, reference):
+    """Closed while the head is being dressed, after its objects were made."""
+    from headshop.headshop_addon import bridge, heads, pipeline, scan_import
+    from headshop.headshop_addon.scan_objects import _upright
+    from headshop.sim.adapt import build as engine
+    from headshop.sim.progress import Progress
+
+    scan_object = bridge.mesh_to_object(reference.skin, "Scan")
+    addon.context.scene.collection.objects.link(scan_object)
+
+    def built(*_):
+        yield Progress(0.5, "Fitting")
+        return engine.BuildResult(reference, {}, {}, ())
+
+    before, monkey = scan_import.datablocks(), pipeline.build_head
+    try:
+        pipeline.build_head = built
+        work = pipeline.build(pipeline.Scan(reference.skin, _upright()), {}, "Ada", scan_object)
+        while next(work).label != "Painting the skin":
+            pass
+        assert scan_import.datablocks() != before and scan_object.hide_render
+        work.close()
+    finally:
+        pipeline.build_head = monkey
+    assert scan_import.datablocks() == before and not scan_object.hide_render
+    assert not heads.find_heads()
