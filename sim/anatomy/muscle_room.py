@@ -10,6 +10,8 @@ from scipy.spatial import cKDTree
 from ..mesh import Mesh, vertex_normals
 from ..triangle_projection import Triangles
 
+#: Points from which on all cores search.
+MANY = 1000
 #: mm between the points a surface is sampled by.
 SPACING = 1.6
 #: mm of skin kept over a muscle; how near it may come to the lining of mouth and lids, and to bone.
@@ -150,7 +152,8 @@ class Samples:
         mislead, so -0.5 takes only what is plainly inside for inside, 0.5 all that is not plainly outside
         """
         count = min(3, len(self.points))  # in a fold the nearest sample may not be the nearest triangle's
-        far, near = self._tree.query(points, k=count, distance_upper_bound=reach)
+        cores = -1 if len(points) >= MANY else 1
+        far, near = self._tree.query(points, k=count, distance_upper_bound=reach, workers=cores)
         far, near = far.reshape(len(points), -1), near.reshape(len(points), -1)
         found = np.isfinite(far[:, 0])
         triangle = self._owner[np.where(np.isfinite(far), near, np.where(found[:, None], near[:, :1], 0))]
