@@ -8,7 +8,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from ..errors import InputError
-from ..mesh import Mesh
+from ..mesh import Mesh, cross_sides
 from ..progress import Progress, Work, finish
 
 #: Fewer triangles than this are no head.
@@ -156,10 +156,14 @@ def _merged(points, colour, same, count):
 
 
 def _flat(points, triangles):
-    a, b, c = (points[triangles[:, k]] for k in range(3))
-    ab, ac, bc = b - a, c - a, c - b
-    longest = np.maximum.reduce([np.einsum("ij,ij->i", e, e) for e in (ab, ac, bc)])
-    return np.linalg.norm(np.cross(ab, ac), axis=1) <= FLAT * longest
+    planes = points.T.copy()
+    a, b, c = (planes.take(triangles[:, k], axis=1) for k in range(3))
+    longest = np.maximum.reduce([_squares(e) for e in (b - a, c - a, c - b)])
+    return np.sqrt(_squares(cross_sides(a, b, c))) <= FLAT * longest
+
+
+def _squares(v):
+    return v[0] * v[0] + v[1] * v[1] + v[2] * v[2]
 
 
 def _repeated(triangles):
