@@ -52,13 +52,13 @@ def test_landmarks_of_a_turned_person_in_metres(person, reference):
     assert np.mean([found.confidence[n] for n in FACE]) > 0.6
 
 
-def test_what_a_damaged_scan_does_not_show_is_in_mid_air_and_unsure(person, reference):
+def test_what_a_damaged_scan_inside_out_does_not_show_is_in_mid_air_and_unsure(person, reference):
     mesh, truth = person
     turned, turn, shift = _turned(mesh, 2)
     upright = (turned.vertices - shift) @ turn
     front = (upright[:, 1] < -20)[turned.triangles].all(axis=1)
     right_cheek = (np.linalg.norm(upright - truth["ch_r"], axis=1) < 22)[turned.triangles].any(axis=1)
-    rest = Mesh.from_triangles(turned.vertices, turned.triangles[front & ~right_cheek])
+    rest = Mesh.from_triangles(turned.vertices, turned.triangles[front & ~right_cheek][:, ::-1])
     found = finish(find_landmarks(rest, reference))
     off = {n: np.linalg.norm(p - (turn @ truth[n] + shift)) for n, p in found.positions.items()}
     assert np.mean([off[n] for n in FACE if n in off]) < 3.0
@@ -69,8 +69,3 @@ def test_what_a_damaged_scan_does_not_show_is_in_mid_air_and_unsure(person, refe
     assert all(found.confidence.get(n, 0.0) < 0.6 * seen for n in hidden)
     assert "op" not in found.sure() and "prn" in found.sure()
 
-
-def test_inside_out_makes_no_difference(person, reference):
-    mesh, truth = person
-    found = finish(find_landmarks(Mesh.from_triangles(mesh.vertices, mesh.triangles[:, ::-1]), reference))
-    assert np.mean([np.linalg.norm(found.positions[n] - truth[n]) for n in FACE]) < 2.5

