@@ -68,4 +68,3 @@ def test_what_a_damaged_scan_inside_out_does_not_show_is_in_mid_air_and_unsure(p
     seen = min(found.confidence[n] for n in ("prn", "en_l", "en_r", "sn"))
     assert all(found.confidence.get(n, 0.0) < 0.6 * seen for n in hidden)
     assert "op" not in found.sure() and "prn" in found.sure()
-

@@ -25,6 +25,8 @@ NO_FACE = (
     "No face is found in the scan: check that it shows one, or give landmarks with --landmarks or by clicking them."
 )
 SURE = 0.25  # confidence from which a landmark helps to build a head
+#: Landmarks that the shape tells better than the range map.
+OWN = set("v op eu g n se ps pi ex ft ac sbal li ch sa sba pa obs".split())
 TRIED = 10  # placements that are looked at closely
 RIVAL, RIVALS = 1.25, 3  # placements that fit this much worse at first may be right: so many are followed
 TRIAL_MODES = 40
@@ -118,8 +120,8 @@ def find_landmarks(mesh: Mesh, reference: Head | None = None, unit_scales=(1.0,)
     positions = {n: p for n, p in positions.items() if n not in missing}
     confidence = {n: confidence[n] for n in positions}
     seen = Mesh.from_triangles(target.vertices, target.triangles)
-    import os
-    if not os.environ.get("NOW"): positions = yield from portion(weighed(seen, positions, confidence, reference, target), 0.9, 1.0)
+    other = yield from portion(weighed(seen, positions, confidence, reference, target), 0.9, 1.0)
+    positions = {n: p if n.partition("_")[0] in OWN else other[n] for n, p in positions.items()}
     return FoundLandmarks(positions, confidence, mid_air, missing, scale, misfit)
 
 
