@@ -23,6 +23,8 @@ from .thin_plate_spline import ThinPlateSpline, similarity
 EAR_MARKS = ("sa", "sba", "pra", "pa", "obs", "obi", "t")
 STIFF = tuple(f"{x}_{s}" for x in ("lid_upper", "lid_lower", "nostril") for s in ("l", "r"))
 AROUND_EAR = 9.0  # mm
+BESIDE_EAR = 6.0  # mm from an ear in its place to data that shows it
+SHOWN = 0.7  # share of an ear with such data from which on it counts as seen
 CARRIED = 60.0  # smoothing of the first warp at a landmark that was not given, mm
 PICKED = 1.0  # the same at a given one, per mm of its uncertainty
 LID_MARKS = ("ps_l", "ps_r", "pi_l", "pi_r")
@@ -67,9 +69,19 @@ def landmark_rows(points: SurfacePoints, names, n: int) -> csr_matrix:
     return csr_matrix((points.weights[at].ravel(), (rows, points.corners[at].ravel())), shape=(len(at), n))
 
 
-def seen_ears(given) -> dict[str, bool]:
-    """Side -> whether that ear is in the scan, told by its landmarks: two or more of its own."""
-    return {side: sum(f"{m}_{side}" in given for m in EAR_MARKS) >= 2 for side in ("l", "r")}
+def seen_ears(reference: Head, given, skin: np.ndarray, target: Surface) -> dict[str, bool]:
+    """Side -> whether that ear is in the scan: two or more of its own landmarks are ``given``, or one, and most of the
+    ear as warped there (``skin`` (n, 3) mm) has data facing the same way beside it."""
+    out = {}
+    for side in ("l", "r"):
+        marks = sum(f"{m}_{side}" in given for m in EAR_MARKS)
+        out[side] = marks >= 2
+        ear = np.flatnonzero(group(reference, f"ear_{side}") > 0.5)
+        if marks == 1 and len(ear):
+            normal = vertex_normals(skin, reference.skin.triangles)
+            found = target.ranked(skin[ear], normal[ear], BESIDE_EAR, 0.5)
+            out[side] = bool((found.found & ~found.border).mean() > SHOWN)
+    return out
 
 
 def fit_skin(reference: Head, target: Surface, given: dict[str, np.ndarray]) -> Work:
@@ -110,7 +122,7 @@ def fit_skin(reference: Head, target: Surface, given: dict[str, np.ndarray]) -> 
     now = np.concatenate([rows @ moved, moved[margin]])
     aim[: len(names)] = np.where(known[:, None], goal, now[: len(names)])
     pairs = Pairs(now, aim, give, len(names))
-    unseen = unseen_ears(reference, given)
+    unseen = unseen_ears(reference, given, moved, data)
     calm = refinable(reference, outer, rim | unseen)
     work = refine(moved, calm, data, feature_triangles(reference, names), pairs)
     warps = None
@@ -189,13 +201,15 @@ def refinable(reference: Head, outer: np.ndarray, rim: np.ndarray) -> np.ndarray
     return outer[~folds[outer].any(axis=1)]
 
 
-def unseen_ears(reference: Head, given) -> np.ndarray:
-    """(n,) bool: ears without landmarks, and the skin close around them: hair lies there."""
+def unseen_ears(reference: Head, given, skin, target: Surface) -> np.ndarray:
+    """(n,) bool: ears that are not in the scan, and the skin close around them if there is no landmark at all: hair
+    lies there."""
     out = np.zeros(len(reference.skin.vertices), dtype=bool)
-    for side, seen in seen_ears(given).items():
+    for side, seen in seen_ears(reference, given, skin, target).items():
         ear = group(reference, f"ear_{side}") > 0.3
         if not seen and ear.any():
-            out |= cKDTree(reference.skin.vertices[ear]).query(reference.skin.vertices)[0] < AROUND_EAR
+            around = 0.0 if any(f"{m}_{side}" in given for m in EAR_MARKS) else AROUND_EAR
+            out |= cKDTree(reference.skin.vertices[ear]).query(reference.skin.vertices)[0] <= around
     return out
 
 
