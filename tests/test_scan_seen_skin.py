@@ -6,6 +6,9 @@ import numpy as np
 from headshop.sim.adapt.untangle import sharp
 from headshop.sim.anatomy.eyeball import reach
 from headshop.sim.anatomy.seen_skin import behind_lids, seen_skin
+from headshop.sim.mesh import Mesh
+from headshop.sim.mesh_piercing import self_piercings
+from headshop.sim.mesh_subdivision import smoother
 from headshop.sim.mesh_unfolding import unfolded
 
 
@@ -22,6 +25,20 @@ def test_the_film_between_the_lids_lies_on_the_eyeball(reference):
 def test_nothing_is_folded_and_little_is_moved(reference):
     seen = seen_skin(reference)
     assert len(sharp(seen.vertices, seen.triangles)) == 0
+
+
+def test_lips_that_pierce_each_other_a_little_are_freed(reference):
+    skin = reference.skin
+    lower = np.asarray(reference.groups["lip_lower"])
+    pressed = reference.with_vertices({"skin": skin.vertices + [0, 0, 0.3] * lower[:, None]})
+    rows, quads = smoother(skin.faces, len(skin.vertices))
+    raw = Mesh(rows @ pressed.skin.vertices, quads)
+    assert len(self_piercings(raw.vertices, raw.triangles)) > 10
+    seen = seen_skin(pressed)
+    assert len(self_piercings(seen.vertices, seen.triangles)) == len(sharp(seen.vertices, seen.triangles)) == 0
+    film = behind_lids(reference, "l") | behind_lids(reference, "r")
+    off = np.linalg.norm(seen.vertices - raw.vertices, axis=1)[: len(film)][~film]
+    assert off.max() < 1.5 and np.median(off) < 1e-9
 
 
 def test_a_slit_opens_and_a_blade_thickens():

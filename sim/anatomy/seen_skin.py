@@ -3,7 +3,8 @@
 
 A scanner sees no lining behind the lids, it sees the eye. Without eyeballs one would look into empty sockets, so that
 lining is drawn forward until it lies on the eyeball like a film between the margins of the lids. Where the lids are
-shut it stays behind them. Where lips and lids end in a corner the surface is opened a little.
+shut it stays behind them. Where lips and lids end in a corner the surface is opened a little, and where what is drawn
+pierces itself between the cage's vertices it is smoothed.
 """
 
 import numpy as np
@@ -13,6 +14,7 @@ from scipy.sparse.linalg import spsolve
 from scipy.spatial import cKDTree
 
 from ..mesh import Mesh, edges
+from ..mesh_smoothing import smoothed_free
 from ..mesh_subdivision import smoother
 from ..mesh_unfolding import unfolded
 from .eyeball import reach
@@ -44,7 +46,9 @@ def seen_skin(head: Head) -> Mesh:
             if gap.max() > SHUT:
                 vertices[inside] = on_eyeball(vertices, quads[film], inside, eye)
     mesh = Mesh(vertices, quads)
-    return mesh.moved(unfolded(vertices, mesh.triangles))
+    open_ = unfolded(vertices, mesh.triangles)
+    free = smoothed_free(open_, mesh.triangles)
+    return mesh.moved(open_ if free is open_ else unfolded(free, mesh.triangles))
 
 
 def on_eyeball(vertices, quads, inside, eye: Eye) -> np.ndarray:
