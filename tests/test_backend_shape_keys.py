@@ -110,3 +110,18 @@ def test_linked_heads_are_refused(bpy, skin, shape_keys, tmp_path):
     bpy.context.scene.collection.children.link(bpy.data.collections["Fran"])
     with pytest.raises(InputError, match="linked"):
         finish(shape_keys.bake_poses(heads.find_heads()[0], {}))
+
+
+def test_the_face_as_scanned_stays_beside_what_is_baked(skin, shape_keys, reference):
+    from headshop.headshop_addon import bridge, heads
+
+    smiling = reference.skin.vertices + 1.5
+    shape_keys.keep_as_scanned(skin, smiling)
+    assert names(skin) == ["Basis", shape_keys.SCANNED]
+    assert skin.data.shape_keys.key_blocks[shape_keys.SCANNED].value == 0
+    np.testing.assert_allclose(bridge.read_positions(skin, shape_keys.SCANNED), smiling, atol=1e-3)
+    np.testing.assert_allclose(heads.read_head(skin).skin.vertices, reference.skin.vertices, atol=1e-3)
+    shape_keys.write_shapes(skin, {"joy": deltas(reference, "skin")}, {})
+    shape_keys.remove_baked(skin)
+    assert names(skin) == ["Basis", shape_keys.SCANNED]
+    assert shape_keys.baked_names(skin) == []

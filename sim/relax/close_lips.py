@@ -12,6 +12,8 @@ from ..adapt.smooth_system import factorised
 NEAR, FAR = 10.0, 32.0
 HOLD = 1.0  # pull toward where it was, of skin that hardly gives way
 MEET = 200.0  # pull of a pair of points on each other
+#: Pull of lips toward where they were, as they get the reference's roundness back, and of skin this far from them, mm.
+KEEP, KEPT, BEYOND = 0.01, 30.0, 7.0
 
 
 def lips_closed(rest: Rest, skin, matrix) -> np.ndarray:
@@ -19,14 +21,34 @@ def lips_closed(rest: Rest, skin, matrix) -> np.ndarray:
 
     matrix (3, 3) turns and scales the reference into the skin's place. The displacement is the one of least bending.
     """
+    start = rest.head.skin.vertices
+    apart, want = pairs_apart(rest, matrix)
+    away = cKDTree(start[rest.lip_rim]).query(start)[0]
+    hold = 1e-4 + HOLD * np.clip((away - NEAR) / (FAR - NEAR), 0, 1) ** 2
+    system = rest.energy + diags(hold) + MEET * (apart.T @ apart)
+    return skin + factorised(system)(MEET * (apart.T @ (want - apart @ skin)))
+
+
+def lips_rounded(rest: Rest, skin, matrix) -> np.ndarray:
+    """Skin (n, 3) mm whose lips differ as smoothly from the reference's as can be: a stretched lip swells again.
+
+    matrix (3, 3) as in `lips_closed`; the lips keep meeting.
+    """
+    base = rest.head.skin.vertices @ matrix.T
+    apart, want = pairs_apart(rest, matrix)
+    lips = np.maximum(rest.head.groups["lip_upper"], rest.head.groups["lip_lower"]) > 0.3
+    away = cKDTree(rest.head.skin.vertices[lips]).query(rest.head.skin.vertices)[0]
+    keep = KEEP * (KEPT / KEEP) ** np.clip(away / BEYOND, 0, 1)
+    system = rest.energy + diags(keep) + MEET * (apart.T @ apart)
+    right = keep[:, None] * (skin - base) + MEET * (apart.T @ (want - apart @ base))
+    return base + factorised(system)(right)
+
+
+def pairs_apart(rest: Rest, matrix):
+    """Sparse rows (k, n) that give the offsets between the lips' pairs, and (k, 3) mm what those are to be."""
     upper, lower = rest.lip_pairs.T
     start = rest.head.skin.vertices
-    n, k = len(start), len(upper)
-    want = (start[upper] - start[lower]) @ matrix.T - (skin[upper] - skin[lower])
+    k = len(upper)
     place = (np.tile(np.arange(k), 2), np.concatenate([upper, lower]))
-    apart = coo_matrix((np.repeat([1.0, -1.0], k), place), shape=(k, n)).tocsr()
-    away = cKDTree(start[rest.lip_rim]).query(start)[0]
-    share = np.clip((away - NEAR) / (FAR - NEAR), 0, 1)
-    hold = 1e-4 + HOLD * share**2
-    system = (rest.energy + diags(hold) + MEET * (apart.T @ apart)).tocsc()
-    return skin + factorised(system)(MEET * (apart.T @ want))
+    apart = coo_matrix((np.repeat([1.0, -1.0], k), place), shape=(k, len(start))).tocsr()
+    return apart, (start[upper] - start[lower]) @ matrix.T

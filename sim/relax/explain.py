@@ -20,9 +20,9 @@ from scipy.spatial.distance import cdist
 from ..acting.expressions import expressions
 from .responses import Responses
 
-OPEN = 0.5  # opening of the jaw that shrinkage expects
+OPEN = 1.0  # opening of the jaw that shrinkage expects
 SMILE = 2.0  # strength of a smile, by the joy of the table of expressions, that it expects
-ALONE = 0.8  # contraction of a muscle beyond its share in the smile
+ALONE = 0.5  # contraction of a muscle beyond its share in the smile
 UNEVEN = 0.15  # difference between the sides
 #: What our muscles do otherwise than a person's: share of what they do, and
 #: its reaches in mm with their shares of the variance.

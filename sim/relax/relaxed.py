@@ -18,7 +18,7 @@ from ..adapt.skin_fit import landmark_rows
 from ..adapt.thin_plate_spline import similarity
 from ..anatomy.head import Head
 from ..mesh_subdivision import drawn
-from .close_lips import lips_closed
+from .close_lips import lips_closed, lips_rounded
 from .explain import explain
 from .parted import answers
 from .people import covariance
@@ -72,7 +72,7 @@ def relaxed(reference: Head, skin, fitted, unseen=None) -> Relaxed:
     found = explain(table, start, sampling, offsets, people, NOISE)
     out = skin - found.displacement @ matrix.T
     gap = lip_gap(rest, skin)
-    out = lips_closed(rest, out, matrix)
+    out = lips_rounded(rest, lips_closed(rest, out, matrix), matrix)
     moved = np.linalg.norm(out - skin, axis=1)[~rest.inner]
     strongest = sorted(found.muscles, key=lambda name: (-found.muscles[name], name))
     report = {

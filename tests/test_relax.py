@@ -1,0 +1,180 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Relaxed faces: a smile with an open mouth becomes the same person's neutral face; closed mouths are left alone."""
+
+import json
+
+import numpy as np
+import pytest
+
+from headshop.sim.acting.pose import Pose, control
+from headshop.sim.adapt.closest import Surface
+from headshop.sim.adapt.landmarks import read_landmarks
+from headshop.sim.adapt.rest import rest_of
+from headshop.sim.adapt.skin_fit import fit_skin
+from headshop.sim.errors import InputError
+from headshop.sim.mesh import Mesh
+from headshop.sim.mesh_subdivision import drawn, smoother
+from headshop.sim.progress import finish
+from headshop.sim.relax.bunching import borne, swelling
+from headshop.sim.relax.choice import require_choice, to_be_followed
+from headshop.sim.relax.mouth_gap import first_and_last_edge
+from headshop.sim.relax.relaxed import relaxed
+from headshop.sim.relax.responses import MUSCLES, UNPAIRED, responses
+from headshop.sim.scan.clean import clean_scan
+from headshop.sim.scan.individual import draw_field
+from headshop.sim.scan.ply import read_ply
+from headshop.sim.tissue.solver import solve
+
+SMILE = {
+    f"{name}_{side}": value
+    for name, value in {"zygomaticus_major": 0.9, "zygomaticus_minor": 0.4, "risorius": 0.5}.items()
+    for side in "lr"
+}
+CORNERS = ("ch_l", "ch_r")
+
+
+@pytest.fixture(scope="module")
+def people(reference, reference_model):
+    """Three random people: (neutral skin, the same with an open smile), cages (n, 3) mm; muscles do it all at once."""
+    start = reference.skin.vertices
+    asked = control(reference_model, Pose(SMILE, jaw_open=0.2))
+    smile = solve(reference_model, asked, max_iterations=150).state.skin - start
+    smile = borne(reference, smile) + swelling(reference, smile)
+    marks = reference.landmark_positions()
+    neutral = [start + draw_field(marks, np.random.default_rng(seed))(start) for seed in (3, 4, 5)]
+    return [(skin, skin + smile) for skin in neutral]
+
+
+def marks_on(reference, cage):
+    return reference.landmarks.on({"skin": drawn(reference.skin.faces, cage)})
+
+
+def gap(reference, cage):
+    upper, lower = rest_of(reference).lip_pairs.T
+    return np.linalg.norm(cage[upper] - cage[lower], axis=1).max()
+
+
+def away(reference, cage, truth):
+    """(k,) mm from the face outside the mouth's region to the true neutral face."""
+    start = reference.skin.vertices
+    seen = (reference.groups["face"] > 0.5) & (reference.groups["inner"] < 0.5)
+    far = np.linalg.norm(start - reference.landmark_positions()["sto"], axis=1) > 45
+    surface = Surface(drawn(reference.skin.faces, truth), reference.skin.triangles)
+    return surface.closest(drawn(reference.skin.faces, cage)[seen & far], 20.0).distance
+
+
+def scan_of(reference, cage):
+    """A scan of a skin: the surface drawn, without what no scanner sees."""
+    rows, quads = smoother(reference.skin.faces, len(cage))
+    hidden = (rows @ np.asarray(reference.groups["inner"], dtype=float)) > 0.3
+    triangles = np.concatenate([quads[:, :3], quads[:, [0, 2, 3]]])
+    return Mesh.from_triangles(rows @ cage, triangles[~hidden[triangles].any(axis=1)])
+
+
+def test_an_open_smile_becomes_neutral(reference, people):
+    for neutral, smiling in people:
+        assert gap(reference, smiling) > 8
+        result = relaxed(reference, smiling, np.ones(len(smiling)))
+        assert gap(reference, result.skin) < 0.3
+        truth, found, before = (marks_on(reference, cage) for cage in (neutral, result.skin, smiling))
+        for corner in CORNERS:
+            assert np.linalg.norm(before[corner] - truth[corner]) > 6
+            assert np.linalg.norm(found[corner] - truth[corner]) < 4
+        assert np.percentile(away(reference, result.skin, neutral), 95) < 1.5
+        assert 2 < result.report["jaw_degrees"] < 11
+        assert next(iter(result.report["muscles"])).startswith("zygomaticus_major")
+
+
+def test_the_same_head_elsewhere_relaxes_to_the_same(reference, people):
+    _, smiling = people[0]
+    turn = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
+    here = relaxed(reference, smiling, np.ones(len(smiling))).skin
+    there = relaxed(reference, 1.1 * smiling @ turn.T + [300.0, 5, -70], np.ones(len(smiling))).skin
+    np.testing.assert_allclose(there, 1.1 * here @ turn.T + [300.0, 5, -70], atol=1e-5)
+
+
+def test_a_neutral_face_is_hardly_changed(reference, people):
+    for neutral, _ in people:
+        result = relaxed(reference, neutral, np.ones(len(neutral)))
+        before, after = (marks_on(reference, cage) for cage in (neutral, result.skin))
+        assert max(np.linalg.norm(before[name] - after[name]) for name in CORNERS) < 3.5
+        assert np.percentile(away(reference, result.skin, neutral), 95) < 1.0
+        assert result.report["jaw_degrees"] < 2
+
+
+def test_each_lip_is_fitted_to_its_own(reference, people):
+    neutral, smiling = people[0]
+    scan = scan_of(reference, smiling)
+    given = marks_on(reference, smiling)
+    fit = finish(fit_skin(reference, Surface(scan.vertices, scan.triangles), given))
+    assert fit.reference is not fit.lips_closed and fit.lips_closed is reference
+    rest = rest_of(reference)
+    upper, lower = rest.lip_pairs[rest.rim[rest.lip_pairs].all(axis=1)].T
+    opened, truth = (np.linalg.norm(cage[upper] - cage[lower], axis=1) for cage in (fit.cage, smiling))
+    assert truth.max() > 8 and np.abs(opened - truth).max() < 3.5
+    base, neutral_again = to_be_followed(fit, "auto")
+    assert base is reference and gap(reference, neutral_again.skin) < 0.3
+    assert to_be_followed(fit, "never") == (fit.reference, None)
+    found, truth = marks_on(reference, neutral_again.skin), marks_on(reference, neutral)
+    assert max(np.linalg.norm(found[name] - truth[name]) for name in CORNERS) < 4
+
+
+def test_closed_lips_are_left_alone_unless_asked(reference, people):
+    neutral, _ = people[1]
+    scan = scan_of(reference, neutral)
+    fit = finish(fit_skin(reference, Surface(scan.vertices, scan.triangles), marks_on(reference, neutral)))
+    assert fit.reference is reference
+    assert to_be_followed(fit, "auto") == (reference, None)
+    assert to_be_followed(fit, "always")[1] is not None
+
+
+def test_edges_of_lips():
+    lip, teeth = np.zeros(10), np.full(10, 6.0)
+    hole = np.full(4, np.nan)
+    assert first_and_last_edge(np.concatenate([lip, teeth, lip]), 2) == ((9, False), (20, False))
+    assert first_and_last_edge(np.concatenate([lip, hole, teeth, hole, lip]), 2) == ((9, True), (28, True))
+    assert first_and_last_edge(np.concatenate([lip, hole[:1], lip]), 2) is None  # a speck
+    crease = np.concatenate([lip, [0.5, 1.5, 2.5, 1.5, 0.5], lip])
+    assert first_and_last_edge(crease, 2) is None
+
+
+def test_responses_are_of_both_sides_alike(reference):
+    table = responses()
+    assert len(table.names) == 2 * len(MUSCLES) - len(UNPAIRED)
+    left, right = (table.fields[table.names.index(f"zygomaticus_major_{side}")] for side in "lr")
+    marks = reference.landmarks
+    assert marks.on({"skin": left})["ch_l"] == pytest.approx(marks.on({"skin": right})["ch_r"] * [-1, 1, 1], abs=0.2)
+    assert marks.on({"skin": left})["ch_l"][2] > 2  # a smile lifts the corner
+    np.testing.assert_allclose(table.jaw_at(0.2), table.jaw[1])
+    assert not table.jaw_at(0.0).any()
+
+
+def test_an_unknown_choice_is_refused():
+    require_choice("auto")
+    with pytest.raises(InputError, match="sometimes"):
+        require_choice("sometimes")
+
+
+@pytest.mark.parametrize("name", ["s1", "s2"])
+def test_smiling_subjects(shared, reference, name):
+    folder = shared / "ict" / "examples"
+    if not (folder / f"{name}_smile_scan.ply").is_file():
+        pytest.skip(f"no {name}_smile in {folder}")
+    smile, neutral = (
+        json.loads((folder / f"{name}{kind}_truth.json").read_text(encoding="utf-8")) for kind in ("_smile", "")
+    )
+    move = np.array(smile["pose_model_to_scan"]) @ np.linalg.inv(neutral["pose_model_to_scan"])
+    truth = {k: move[:3, :3] @ p + move[:3, 3] for k, p in neutral["landmarks"].items()}
+    scan, _ = clean_scan(read_ply(folder / f"{name}_smile_scan.ply"))
+    given = read_landmarks(folder / f"{name}_smile_truth.json")
+    fit = finish(fit_skin(reference, Surface(scan.vertices, scan.triangles, smooth=2.0), given))
+    base, result = to_be_followed(fit, "auto")
+    assert gap(reference, result.skin) < 0.3
+    found = marks_on(base, result.skin)
+    assert max(np.linalg.norm(found[corner] - truth[corner]) for corner in CORNERS) < 5
+    surface = read_ply(folder / f"{name}_truth.ply")
+    surface = Surface(surface.vertices @ move[:3, :3].T + move[:3, 3], surface.triangles)
+    seen = (reference.groups["face"] > 0.5) & (reference.groups["inner"] < 0.5)
+    far = np.linalg.norm(reference.skin.vertices - reference.landmark_positions()["sto"], axis=1) > 45
+    distance = surface.closest(drawn(reference.skin.faces, result.skin)[seen & far], 20.0).distance
+    assert distance.mean() < 0.75 and np.percentile(distance, 95) < 2.5
