@@ -18,7 +18,7 @@ BESIDE = (
     4.0,
 )  # mm: a median above the first, or above the second with a quarter above the third, is another's
 ODD = 12.0  # mm: a single landmark that far from where all others expect it, and
-STRANGE = 6.0  # standard deviations of that expectation, is a mistake
+STRANGE = 6.5  # standard deviations of that expectation, is a mistake
 UNLIKE = 3.5  # variance of the whole arrangement relative to people's, above which it is no face
 GAIN = 12.0  # squared standard deviations that an exchange of names must save to count as a mistake
 SCALE = (0.45, 1.6)  # head size relative to the reference
