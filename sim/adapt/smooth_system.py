@@ -64,7 +64,7 @@ def solve_displacement(smooth, sampling, blocks, pulls, start):
     r = right - apply(x)
     z = precondition(r.reshape(n, 3)).ravel()
     p, rz = z.copy(), float(r @ z)
-    goal = 1e-10 * max(float(right @ precondition(right.reshape(n, 3)).ravel()), 1e-12)
+    goal = 1e-7 * max(float(right @ precondition(right.reshape(n, 3)).ravel()), 1e-12)
     for _ in range(60):
         if rz <= goal:
             break
