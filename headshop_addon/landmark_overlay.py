@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Landmarks drawn over the viewport: a point each, full where placed, a ring where estimated, names beside.
+"""Landmarks drawn over the viewport: a point each, names beside.
+
+Blue where placed, green where found, small and yellow where estimated.
 
 Drawing reads the saved landmarks of the scan and keeps nothing.
 """
@@ -13,6 +15,7 @@ from . import active
 from .preferences import preferences
 
 PLACED = (0.25, 0.85, 1.0, 1.0)
+FOUND = (0.45, 1.0, 0.45, 1.0)
 ESTIMATED = (1.0, 0.75, 0.25, 0.9)
 CHOSEN = (1.0, 1.0, 1.0, 1.0)
 SHADOW = (0.0, 0.0, 0.0, 0.8)
@@ -47,7 +50,7 @@ def _draw():
     size = (settings.point_size if settings else 9.0) * scale
     shader = gpu.shader.from_builtin("UNIFORM_COLOR")
     gpu.state.blend_set("ALPHA")
-    for state, colour, factor in (("DERIVED", ESTIMATED, 0.6), ("PLACED", PLACED, 1.0)):
+    for state, colour, factor in (("DERIVED", ESTIMATED, 0.6), ("FOUND", FOUND, 0.8), ("PLACED", PLACED, 1.0)):
         at = [p for n, s, p in on_screen if s == state and n != chosen]
         _discs(shader, batch_for_shader, at, size * factor / 2, colour)
     _discs(shader, batch_for_shader, [p for n, _, p in on_screen if n == chosen], size * 0.7, CHOSEN)

@@ -25,6 +25,7 @@ STATES = (
     ("MISSING", "Missing", "Not placed yet", "BLANK1", 0),
     ("DERIVED", "Estimated", "Carried over from the reference head by the landmarks already placed", "KEYFRAME", 1),
     ("PLACED", "Placed", "Placed by hand or read from a file", "KEYFRAME_HLT", 2),
+    ("FOUND", "Found", "Found on the scan by its shape", "HANDLETYPE_AUTO_CLAMP_VEC", 3),
 )
 
 
@@ -71,6 +72,11 @@ class HEADSHOP_PG_landmark(bpy.types.PropertyGroup):
 
     co: FloatVectorProperty(name="Position", description="In the scan object's own space", size=3, subtype="XYZ")
     state: EnumProperty(name="State", items=STATES)
+    found: FloatVectorProperty(
+        name="Found", description="Where it was found, before any correction", size=3, subtype="XYZ"
+    )
+    confidence: FloatProperty(name="Confidence", description="How sure a found landmark is", min=0.0, max=1.0)
+    mid_air: BoolProperty(name="In Mid-Air", description="The scan shows nothing where it lies")
 
 
 class _Sliders:

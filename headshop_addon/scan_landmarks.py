@@ -52,7 +52,7 @@ def forget(scan, *names: str) -> None:
     """Take back the landmarks named, or all of them."""
     for name, item in entries(scan).items():
         if not names or name in names:
-            item.state = "MISSING"
+            item.state, item.confidence, item.mid_air = "MISSING", 0.0, False
 
 
 def replace(scan, placed: dict) -> None:
@@ -69,12 +69,53 @@ def follow(scan) -> None:
     With fewer than three placed, or where these lie on a line, there is nothing to follow: the others become missing.
     """
     given = positions(scan)
+    _follow_found(scan, given)
+    given = to_build(scan)
     everything = _completed(given) if len(given) >= ENOUGH_TO_FOLLOW and not _on_a_line(given) else {}
     for name, item in entries(scan).items():
-        if item.state != "PLACED":
+        if item.state not in ("PLACED", "FOUND"):
             item.state = "DERIVED" if name in everything else "MISSING"
             if name in everything:
                 item.co = np.asarray(everything[name]) * METRES
+
+
+def take_found(scan, found) -> None:
+    """Store `sim.landmarks.find.FoundLandmarks`; those placed by hand stay and the found ones follow them."""
+    for name, item in entries(scan).items():
+        there = name in found.positions
+        item.confidence = found.confidence[name] if there else 0.0
+        item.mid_air = name in found.mid_air
+        if there:
+            item.found = np.asarray(found.positions[name]) * METRES
+        if item.state != "PLACED":
+            item.state = "FOUND" if there else "MISSING"
+            item.co = item.found
+    follow(scan)
+
+
+def found(scan) -> tuple[dict[str, np.ndarray], dict[str, float]]:
+    """Where landmarks were found (mm) before any correction, and how surely, 0..1."""
+    items = [item for item in scan.headshop.landmarks if item.confidence > 0]
+    return {i.name: np.array(i.found, dtype=float) / METRES for i in items}, {i.name: i.confidence for i in items}
+
+
+def to_build(scan) -> dict[str, np.ndarray]:
+    """Landmark -> (3,) mm of those that a head is built from: the placed, and the found ones that are sure enough."""
+    from ..sim.landmarks.sure import SURE
+
+    sure = {i.name for i in scan.headshop.landmarks if i.confidence >= SURE and not i.mid_air}
+    return {n: p for n, p in positions(scan, "FOUND").items() if n in sure} | positions(scan)
+
+
+def _follow_found(scan, placed) -> None:
+    from ..sim.landmarks.correction import follow_corrections
+
+    positions_found, confidence = found(scan)
+    if positions_found:
+        moved = follow_corrections(positions_found, confidence, placed)
+        for name, item in entries(scan).items():
+            if item.state == "FOUND" and name in moved:
+                item.co = moved[name] * METRES
 
 
 def _completed(given: dict) -> dict:
@@ -91,6 +132,14 @@ def _on_a_line(given: dict) -> bool:
     return bool(extent[1] < 0.05 * extent[0])
 
 
+def most_useful(scan) -> list[str]:
+    """Found landmarks that were not corrected, the one first whose correction helps most."""
+    from ..sim.landmarks.correction import most_useful as ranked
+
+    positions_found, confidence = found(scan)
+    return ranked(positions_found, confidence, positions(scan)) if positions_found else []
+
+
 def snapshot(scan) -> tuple:
     """All landmarks as they are, for `restore`."""
     return tuple((item.name, tuple(item.co), item.state) for item in entries(scan).values())
@@ -104,8 +153,13 @@ def restore(scan, taken: tuple) -> None:
 
 
 def next_to_place(scan, skipped=(), chosen: str | None = None) -> str | None:
-    """The landmark to ask for next: the chosen one, or the first in `ORDER` neither placed nor skipped."""
+    """The landmark to ask for next: the chosen one, the one whose correction helps most, or the first in `ORDER`.
+
+    Those placed or skipped are not asked for again.
+    """
     stored = entries(scan)
     if chosen is not None:
         return chosen
+    if useful := most_useful(scan):
+        return next((n for n in useful if n not in skipped), None)
     return next((n for n in ORDER if stored[n].state != "PLACED" and n not in skipped), None)

@@ -136,9 +136,12 @@ def load_landmarks(scan: bpy.types.Object, path) -> int:
 
 
 def save_landmarks(scan: bpy.types.Object, path) -> int:
-    """Write the placed landmarks to a file, in the axes of the scan's file; returns how many."""
+    """Write the placed landmarks, and the found ones that are sure enough, to a file.
+
+    They are in the axes of the scan's file; returns how many.
+    """
     turn = _rotation(scan)
-    placed = scan_landmarks.positions(scan)
+    placed = scan_landmarks.to_build(scan)
     write_landmarks(path, {n: p @ turn for n, p in placed.items()}, [n for n in SKIN if n not in placed])
     return len(placed)
 
@@ -152,7 +155,7 @@ def build(context, scan: bpy.types.Object, name: str = "") -> Work:
     ------
     InputError : too few landmarks, or they do not fit the scan.
     """
-    placed = scan_landmarks.positions(scan)
+    placed = scan_landmarks.to_build(scan)
     if len(placed) < scan_landmarks.ENOUGH_TO_BUILD:
         raise InputError(f"{scan.name} has {len(placed)} landmarks: place at least {scan_landmarks.ENOUGH_TO_BUILD}.")
     report = json.loads(scan.get(heads.REPORT, "{}")).get("scan", {})

@@ -7,7 +7,7 @@ from ..headshop_addon.class_registry import register_all, unregister_all
 
 FILES = (
     *("import_scan", "make_sample", "choose_scan"),
-    *("load_landmarks", "save_landmarks", "click_landmarks", "clear_landmarks"),
+    *("find_landmarks", "load_landmarks", "save_landmarks", "click_landmarks", "clear_landmarks"),
     *("build_head", "dress_head", "repack_uv"),
     *("reset_muscles", "set_expression", "key_sliders"),
     *("bake_expressions", "bake_muscles", "bake_performance"),

@@ -24,7 +24,7 @@ class HEADSHOP_OT_build_head(Job, bpy.types.Operator):
         """Needs a scan with enough landmarks."""
         if not (polls.library(cls, "scipy") and polls.scan(cls, context) and polls.object_mode(cls, context)):
             return False
-        missing = scan_landmarks.ENOUGH_TO_BUILD - len(scan_landmarks.positions(active.scan(context)))
+        missing = scan_landmarks.ENOUGH_TO_BUILD - len(scan_landmarks.to_build(active.scan(context)))
         if missing > 0:
             cls.poll_message_set(f"Place {missing} more landmark{'s' if missing > 1 else ''} on the scan first")
             return False

@@ -19,7 +19,7 @@ class HEADSHOP_OT_clear_landmarks(Simple, bpy.types.Operator):
         """Needs landmarks."""
         if not polls.scan(cls, context):
             return False
-        if not scan_landmarks.positions(active.scan(context), "PLACED", "DERIVED"):
+        if not scan_landmarks.positions(active.scan(context), "PLACED", "FOUND", "DERIVED"):
             cls.poll_message_set("There are no landmarks yet")
             return False
         return True

@@ -23,7 +23,7 @@ class HEADSHOP_OT_save_landmarks(Simple, ExportHelper, bpy.types.Operator):
         """Needs landmarks."""
         if not polls.library(cls, "scipy") or not polls.scan(cls, context):
             return False
-        if not scan_landmarks.positions(active.scan(context)):
+        if not scan_landmarks.to_build(active.scan(context)):
             cls.poll_message_set("Place landmarks first")
             return False
         return True

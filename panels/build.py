@@ -27,7 +27,7 @@ class HEADSHOP_PT_build(SidebarPanel, bpy.types.Panel):
         scan, skin = active.scan(context), active.skin(context)
         if scan is None and skin is None:
             hint(layout, context, "A head is built from a scan with landmarks.")
-        elif skin is None and len(scan_landmarks.positions(scan)) < scan_landmarks.ENOUGH_TO_BUILD:
+        elif skin is None and len(scan_landmarks.to_build(scan)) < scan_landmarks.ENOUGH_TO_BUILD:
             hint(layout, context, "Place at least four landmarks on the scan first.")
         elif skin is None:
             hint(layout, context, "Ready: this takes some seconds.", "CHECKMARK")

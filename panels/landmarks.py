@@ -7,7 +7,7 @@ from ..headshop_addon import active, scan_landmarks
 from ..sim.anatomy.landmark_names import LABELS, SKIN, label
 from .common import SidebarPanel, hint, progress
 
-_ICONS = {"PLACED": "KEYFRAME_HLT", "DERIVED": "KEYFRAME", "MISSING": "BLANK1"}
+_ICONS = {"PLACED": "KEYFRAME_HLT", "FOUND": "HANDLETYPE_AUTO_CLAMP_VEC", "DERIVED": "KEYFRAME", "MISSING": "BLANK1"}
 
 
 class HEADSHOP_UL_landmarks(bpy.types.UIList):
@@ -37,14 +37,25 @@ class HEADSHOP_PT_landmarks(SidebarPanel, bpy.types.Panel):
         column = layout.column(align=True)
         row = column.row(align=True)
         row.scale_y = 1.4
+        row.operator("headshop.find_landmarks", icon="VIEWZOOM")
+        row = column.row(align=True)
         row.operator("headshop.click_landmarks", icon="RESTRICT_SELECT_OFF")
         row = column.row(align=True)
         row.operator("headshop.load_landmarks", text="Load", icon="FILE_FOLDER")
         row.operator("headshop.save_landmarks", text="Save", icon="FILE_TICK")
         row.operator("headshop.clear_landmarks", text="Clear", icon="TRASH")
         estimated = len(scan_landmarks.positions(scan, "DERIVED"))
-        if placed == 0:
-            hint(layout, context, "Click the points you are asked for; four are enough, twelve are good.")
+        found = len(scan_landmarks.positions(scan, "FOUND"))
+        if found:
+            text = f"{found} found, {placed} placed"
+            layout.label(text=text + (f", {estimated} estimated" if estimated else ""), icon="CHECKMARK")
+            self._advise(layout, scan)
+        elif placed == 0:
+            hint(
+                layout,
+                context,
+                "Find the landmarks, or click the points you are asked for; four are enough.",
+            )
         elif placed < scan_landmarks.ENOUGH_TO_BUILD:
             wanted = scan_landmarks.ENOUGH_TO_BUILD - placed
             hint(layout, context, f"{placed} placed, {wanted} more needed to build a head.")
@@ -54,6 +65,13 @@ class HEADSHOP_PT_landmarks(SidebarPanel, bpy.types.Panel):
         row = layout.row(align=True)
         row.prop(settings, "show_landmarks", text="Show", toggle=True)
         row.prop(settings, "show_names", toggle=True)
+
+    def _advise(self, layout, scan):
+        """Name the landmark whose correction helps most."""
+        name = next(iter(scan_landmarks.most_useful(scan)), None)
+        if name is not None:
+            text = f"Correct {name}: {label(name).partition(',')[0]}"
+            layout.operator("headshop.click_landmarks", text=text, icon="RESTRICT_SELECT_OFF").start = name
 
 
 class HEADSHOP_PT_landmark_list(SidebarPanel, bpy.types.Panel):

@@ -6,6 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..adapt.closest import Surface
+from ..adapt.gate import RELIEF
+from ..adapt.relief import face_likeness
 from ..adapt.scan_surface import NORMALS
 from ..anatomy.head import Head
 from ..anatomy.storage import load_head
@@ -20,16 +22,17 @@ from .picked import picked
 from .pose_search import search_poses
 from .shape_fit import TRIAL, NoFaceError, fit_shape
 from .shape_space import shape_space
+from .sure import SURE
 
 NO_FACE = (
     "No face is found in the scan: check that it shows one, or give landmarks with --landmarks or by clicking them."
 )
-SURE = 0.25  # confidence from which a landmark helps to build a head
 #: Landmarks that the shape tells better than the range map.
 OWN = set("v op eu g n se ps pi ex ft ac sbal li ch sa sba pa obs".split())
 TRIED = 10  # placements that are looked at closely
 RIVAL, RIVALS = 1.25, 3  # placements that fit this much worse at first may be right: so many are followed
 TRIAL_MODES = 40
+UNLIKE = 3.9  # mm: the same for the undeformed face, where four fifths fit best
 POOR = 2.6  # mm on a head of the reference's size: a mean distance in the face above which there is none
 
 
@@ -112,7 +115,7 @@ def find_landmarks(mesh: Mesh, reference: Head | None = None, unit_scales=(1.0,)
     if not results:
         raise InputError(NO_FACE)
     misfit, scale, fit, target = min(results, key=lambda t: t[0])
-    if misfit > POOR:
+    if misfit > POOR or fit.pose.misfit > UNLIKE or _likeness(reference, space, fit) < RELIEF:
         raise InputError(NO_FACE)
     fit, _ = yield from _run(fit_expression(space, target, fit), 0.8, 0.9, "Looking at lips and lids")
     positions = picked(space, fit, target)
@@ -132,6 +135,14 @@ def _facing(space, target, pose):
     found = target.closest(points[face], 15.0)
     agree = np.einsum("ij,ij->i", found.normals, vertex_normals(points, space.triangles)[face])[found.found]
     return target.turned() if len(agree) and np.median(agree) < 0 else target
+
+
+def _likeness(reference, space, fit):
+    """How much relief of a face the scan has where the skin was laid on it, see `adapt.likeness`."""
+    skin = reference.skin.vertices @ fit.matrix.T + fit.pose.shift
+    fitted = np.zeros(len(skin))
+    skin[space.vertices], fitted[space.vertices] = fit.points, fit.trust
+    return face_likeness(reference, skin, fitted)
 
 
 def _misfit(space, fit):

@@ -35,6 +35,7 @@ SMILE, SMILE_REACH = (4.0, 3.0, 4.0), 20.0
 class ShapeSpace:
     """A skin and its variation.
 
+    vertices (n,) : indices of the points among the vertices of the reference's skin
     points (n, 3) mm : outer skin of the reference, as drawn
     modes (n, 3, m) mm : displacement for one standard deviation of each coefficient
     seal (m, m) : quadratic form of lips that part, in standard deviations: small where the mouth is closed
@@ -47,6 +48,7 @@ class ShapeSpace:
     names (k,) : landmarks; corners (k, 3), weights (k, 3) : where they ride on the points
     """
 
+    vertices: np.ndarray
     points: np.ndarray
     modes: np.ndarray
     seal: np.ndarray
@@ -110,6 +112,7 @@ def shape_space(head: Head) -> ShapeSpace:
     upper, lower = _lips(points, group("lip_upper") > 0.5, group("lip_lower") > 0.5)
     apart = (modes[upper] - modes[lower]).reshape(-1, modes.shape[2])
     return ShapeSpace(
+        np.flatnonzero(outside),
         points,
         modes,
         apart.T @ apart / (SEAL**2 * len(upper) / LIPS),

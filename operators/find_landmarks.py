@@ -1,0 +1,34 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Find the landmarks of the scan without help."""
+
+import bpy
+
+from ..headshop_addon import active, bridge, polls, scan_landmarks
+from ..headshop_addon.jobs import Job
+
+
+class HEADSHOP_OT_find_landmarks(Job, bpy.types.Operator):
+    """Find the landmarks of the scan by its shape. Those placed by hand stay; correct the others by clicking"""
+
+    bl_idname = "headshop.find_landmarks"
+    bl_label = "Find Landmarks"
+    bl_options = {"REGISTER", "UNDO"}
+    panel = "landmarks"
+
+    @classmethod
+    def poll(cls, context):
+        """Needs a scan that is not being edited."""
+        return polls.library(cls, "scipy") and polls.scan(cls, context) and polls.object_mode(cls, context)
+
+    def work(self, context):
+        """Look for the face in the scan's mesh."""
+        from ..sim.landmarks.find import find_landmarks
+
+        self._scan = active.scan(context)
+        return (yield from find_landmarks(bridge.object_to_mesh(self._scan)))
+
+    def finish(self, context, result):
+        """Store them on the scan."""
+        scan_landmarks.take_found(self._scan, result)
+        context.scene.headshop.show_landmarks = True
+        return f"{self._scan.name}: {result.summary()}"
