@@ -16,7 +16,7 @@ from headshop.sim.mesh import Mesh
 from headshop.sim.mesh_subdivision import drawn, smoother
 from headshop.sim.progress import finish
 from headshop.sim.relax.bunching import borne, swelling
-from headshop.sim.relax.choice import require_choice, to_be_followed
+from headshop.sim.relax.choice import kept_open, neutral_of, require_choice
 from headshop.sim.relax.mouth_gap import first_and_last_edge
 from headshop.sim.relax.relaxed import relaxed
 from headshop.sim.relax.responses import MUSCLES, UNPAIRED, responses
@@ -112,9 +112,12 @@ def test_each_lip_is_fitted_to_its_own(reference, people):
     upper, lower = rest.lip_pairs[rest.rim[rest.lip_pairs].all(axis=1)].T
     opened, truth = (np.linalg.norm(cage[upper] - cage[lower], axis=1) for cage in (fit.cage, smiling))
     assert truth.max() > 8 and np.abs(opened - truth).max() < 3.5
-    base, neutral_again = to_be_followed(fit, "auto")
-    assert base is reference and gap(reference, neutral_again.skin) < 0.3
-    assert to_be_followed(fit, "never") == (fit.reference, None)
+    neutral_again = neutral_of(fit, "auto")
+    assert gap(reference, neutral_again.skin) < 0.3
+    opened = kept_open(reference, reference, fit.cage, neutral_again.jaw)
+    np.testing.assert_array_equal(opened.skin.vertices[~rest.inner], fit.cage[~rest.inner])
+    assert opened.jaw.incisor[2] < reference.jaw.incisor[2] - 3
+    np.testing.assert_array_equal(opened.parts["skull"].vertices, reference.parts["skull"].vertices)
     found, truth = marks_on(reference, neutral_again.skin), marks_on(reference, neutral)
     assert max(np.linalg.norm(found[name] - truth[name]) for name in CORNERS) < 4
 
@@ -124,8 +127,8 @@ def test_closed_lips_are_left_alone_unless_asked(reference, people):
     scan = scan_of(reference, neutral)
     fit = finish(fit_skin(reference, Surface(scan.vertices, scan.triangles), marks_on(reference, neutral)))
     assert fit.reference is reference
-    assert to_be_followed(fit, "auto") == (reference, None)
-    assert to_be_followed(fit, "always")[1] is not None
+    assert neutral_of(fit, "auto") is None and neutral_of(fit, "never") is None
+    assert neutral_of(fit, "always") is not None
 
 
 def test_edges_of_lips():
@@ -168,9 +171,9 @@ def test_smiling_subjects(shared, reference, name):
     scan, _ = clean_scan(read_ply(folder / f"{name}_smile_scan.ply"))
     given = read_landmarks(folder / f"{name}_smile_truth.json")
     fit = finish(fit_skin(reference, Surface(scan.vertices, scan.triangles, smooth=2.0), given))
-    base, result = to_be_followed(fit, "auto")
+    result = neutral_of(fit, "auto")
     assert gap(reference, result.skin) < 0.3
-    found = marks_on(base, result.skin)
+    found = marks_on(reference, result.skin)
     assert max(np.linalg.norm(found[corner] - truth[corner]) for corner in CORNERS) < 5
     surface = read_ply(folder / f"{name}_truth.ply")
     surface = Surface(surface.vertices @ move[:3, :3].T + move[:3, 3], surface.triangles)

@@ -13,7 +13,7 @@ from ..errors import InputError
 from ..mesh import Mesh
 from ..mesh_subdivision import drawn, smoother
 from ..progress import Progress, Work, portion
-from ..relax.choice import require_choice, to_be_followed
+from ..relax.choice import kept_open, neutral_of, require_choice
 from .bone import depth_under
 from .closest import Surface
 from .fit_sentence import fit_sentence, fitted_shares, invented
@@ -83,15 +83,17 @@ def build_head(
     refuse_poor(fit_report(reference, fit, given))
     check_likeness(fit.reference, fit.cage, fit.fitted.fitted)
     yield Progress(0.62, "Relaxing the face")
-    base, neutral = to_be_followed(fit, relax)
+    neutral = neutral_of(fit, relax)
     skin = fit.cage if neutral is None else neutral.skin
-    followed = yield from portion(follow(base, skin, fit.unseen), 0.63, 0.85)
+    followed = yield from portion(follow(fit.lips_closed, skin, fit.unseen), 0.63, 0.85)
     yield Progress(0.85, "Checking the anatomy")
     head = followed.head
     scanned = head.skin.vertices + (fit.cage - skin)
     report = fit_report(reference, fit, given, scanned)
     report["invented"] = invented(fitted_shares(head, fit.fitted.fitted))
     report["sentence"] = fit_sentence(report, report["invented"])
+    if neutral is not None and relax == "never":
+        head, neutral = kept_open(fit.lips_closed, head, scanned, neutral.jaw), None
     report["relaxed"] = None if neutral is None else neutral.report
     yield Progress(0.87, "Checking the anatomy")
     anatomy = anatomy_report(head)

@@ -1,10 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Whether a fitted face is to be relaxed, and what the head is then made of."""
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from ..acting.plain_posing import plainly_posed
+from ..adapt.rest import rest_of
 from ..anatomy.head import Head
 from ..errors import InputError
+from ..tissue.jaw import jaw_transform
 from .relaxed import Relaxed, relaxed
 
 if TYPE_CHECKING:
@@ -13,6 +19,8 @@ if TYPE_CHECKING:
 #: ``auto`` relaxes where the lips are parted.
 CHOICES = ("auto", "always", "never")
 
+DEEP = 3  # edges behind the lips from which on the mouth's lining lies on the jaws
+
 
 def require_choice(choice: str) -> None:
     """Raise `InputError` for a choice that is none of `CHOICES`."""
@@ -20,9 +28,27 @@ def require_choice(choice: str) -> None:
         raise InputError(f"To relax {choice!r} is unknown: choose {', '.join(CHOICES)}.")
 
 
-def to_be_followed(fit: "SkinFit", choice: str) -> tuple[Head, Relaxed | None]:
-    """The reference that a fitted skin was warped from, and the relaxed skin (None: it stays as scanned)."""
-    parted = fit.reference is not fit.lips_closed
-    if choice == "always" or (choice == "auto" and parted):
-        return fit.lips_closed, relaxed(fit.lips_closed, fit.cage, fit.fitted.fitted, fit.unseen)
-    return fit.reference, None
+def neutral_of(fit: "SkinFit", choice: str) -> Relaxed | None:
+    """The relaxed skin under which bone, teeth and muscles of a head are to be made; None: under the skin as scanned.
+
+    An open mouth is always closed for that, as flesh over bone is known of closed ones; `kept_open` opens it again.
+    """
+    if choice == "always" or fit.reference is not fit.lips_closed:
+        return relaxed(fit.lips_closed, fit.cage, fit.fitted.fitted, fit.unseen)
+    return None
+
+
+def kept_open(reference: Head, head: Head, scanned: np.ndarray, opening: float) -> Head:
+    """``head`` with the skin as ``scanned`` (n, 3) mm and the jaw open by ``opening``, 0..1, as its lining follows.
+
+    reference : the head that ``head`` was made from
+    """
+    posed = plainly_posed(head, jaw_open=min(opening, 1.0))
+    rest = rest_of(reference)
+    lining = np.zeros(len(scanned))
+    rows = rest.organs["mouth"]
+    lining[rows] = np.clip(rest.behind[rows] / DEEP, 0, 1)
+    skin = scanned + lining[:, None] * (posed.skin.vertices - scanned)
+    rotation, shift = jaw_transform(head.jaw, min(opening, 1.0))
+    jaw = replace(head.jaw, incisor=rotation @ head.jaw.incisor + shift)
+    return replace(posed.with_vertices({"skin": skin}), jaw=jaw)

@@ -29,15 +29,18 @@ UNMOVED, COARSE = 0.25, 30.0
 ROUND = 16.0  # mm between the points that are looked at on the cheeks
 NOISE = 1.0  # mm by which a landmark may be wrong
 UNSURE = 0.02  # trust in skin without data, of 1
+#: Muscles that press the lips or pull them down: a person's own chin looks too much like what they do.
+NO_SMILE = ("mentalis", "platysma", "depressor_anguli_oris", "orbicularis_oris_lower")
 #: Landmarks that no expression moves much and that hair may hide; the middle of the mouth lies on no lip.
 LEFT_OUT = ("sto", "v", "op", "tr", *(f"{m}_{s}" for m in "go sa sba pra pa obs obi".split() for s in "lr"))
 
 
 @dataclass(frozen=True, eq=False)
 class Relaxed:
-    """skin (n, 3) mm, the neutral cage; report : what was done, for people to read."""
+    """skin (n, 3) mm, the neutral cage; jaw : how far it was open, 0..1; report : what was done, for people to read."""
 
     skin: np.ndarray
+    jaw: float
     report: dict
 
 
@@ -69,7 +72,8 @@ def relaxed(reference: Head, skin, fitted, unseen=None) -> Relaxed:
     weights = np.concatenate([np.zeros(len(looked)), still])
     people = covariance(reference.landmark_positions(), np.concatenate([looked, start[far]]), weights)
     people = people[: offsets.size, : offsets.size]
-    found = explain(table, start, sampling, offsets, people, NOISE)
+    muscles = [name for name in table.names if not name.startswith(NO_SMILE)]
+    found = explain(table, start, sampling, offsets, people, NOISE, muscles)
     out = skin - found.displacement @ matrix.T
     gap = lip_gap(rest, skin)
     out = lips_rounded(rest, lips_closed(rest, out, matrix), matrix)
@@ -81,7 +85,7 @@ def relaxed(reference: Head, skin, fitted, unseen=None) -> Relaxed:
         "lips_apart_mm": gap,
         "moved_max_mm": float(moved.max()),
     }
-    return Relaxed(out, report)
+    return Relaxed(out, found.jaw, report)
 
 
 def lip_gap(rest, skin) -> float:
