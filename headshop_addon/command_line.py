@@ -51,7 +51,7 @@ def parser() -> argparse.ArgumentParser:
         return commands.add_parser(name, help=about, description=about, parents=[*parents, common], allow_abbrev=False)
 
     build = command("build", "Turn a scan into an animatable head.", reading, plain)
-    build.add_argument("--landmarks", metavar="FILE", help="landmark file (headshop-landmarks/1)")
+    build.add_argument("--landmarks", metavar="FILE", help="landmark file (default: found automatically)")
     sizes = (0, 512, 1024, 2048, 4096)
     about = "pixels along a side of the displacement and normal map, 0 for none (default: 1024)"
     build.add_argument("--detail", type=int, choices=sizes, default=1024, metavar="SIZE", help=about)

@@ -73,3 +73,11 @@ def test_the_operator_finds_them_and_refuses_a_ball(addon, reference):
     addon.context.scene.headshop.scan = addon.context.active_object
     with pytest.raises(RuntimeError, match="No face"):
         addon.ops.headshop.find_landmarks()
+
+
+def test_a_file_of_found_landmarks_gives_back_the_sure_ones(found, tmp_path):
+    from headshop.sim.adapt.landmarks import read_landmarks, write_landmarks
+
+    write_landmarks(tmp_path / "found.json", found.positions, found.missing, found.confidence, found.mid_air)
+    assert set(read_landmarks(tmp_path / "found.json")) == set(found.sure())
+    assert "op" not in found.sure() and "ch_l" in found.sure()

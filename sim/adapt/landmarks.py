@@ -14,6 +14,7 @@ from ..anatomy import landmark_names
 from ..anatomy.landmark_names import LABELS, SKIN
 from ..anatomy.storage import write_atomically
 from ..errors import InputError
+from ..landmarks.sure import SURE
 from .thin_plate_spline import flatness
 
 FORMAT = "headshop-landmarks/1"
@@ -66,7 +67,8 @@ def _once(pairs):
 
 
 def read_landmarks(path) -> dict[str, np.ndarray]:
-    """Landmark name -> (3,) mm of a landmark file; names listed as missing are left out.
+    """Landmark name -> (3,) mm of a landmark file; names listed as missing are left out, and so are those
+    that a file of found landmarks calls mid-air or hardly sure.
 
     Raises
     ------
@@ -108,9 +110,19 @@ def parse_landmarks(document, source: str = "The landmark file") -> dict[str, np
     for name in [*given, *(m for m in missing if isinstance(m, str))]:
         if name not in SKIN:
             raise InputError(f'{source} names an unknown landmark "{name}"{_suggestion(name)}.')
-    positions = {n: _position(source, n, p) for n, p in given.items() if n not in missing}
+    left = {m for m in missing if isinstance(m, str)} | _unsure(document)
+    positions = {n: _position(source, n, p) for n, p in given.items() if n not in left}
     require_usable(positions, source)
     return positions
+
+
+def _unsure(document) -> set[str]:
+    """Names that a file of found landmarks says are in mid-air or hardly sure: no evidence to fit a head to."""
+    confidence, mid_air = document.get("confidence"), document.get("mid_air")
+    if not isinstance(confidence, dict) or not isinstance(mid_air, list):
+        return set()
+    low = {n for n, c in confidence.items() if isinstance(c, (int, float)) and c < SURE}
+    return low | {n for n in mid_air if isinstance(n, str)}
 
 
 def require_usable(positions: dict[str, np.ndarray], source: str = "The landmark file") -> None:

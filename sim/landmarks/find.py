@@ -32,7 +32,7 @@ TRIED = 10  # placements that are looked at closely
 RIVAL, RIVALS = 1.25, 3  # placements that fit this much worse at first may be right: so many are followed
 TRIAL_MODES = 40
 UNLIKE = 3.9  # mm: the same for the undeformed face, where four fifths fit best
-RELIEF = 0.53  # correlation with the relief of a face: scans of faces have 0.67 and more, balls, boxes and the back of a head 0.4
+RELIEF = 0.53  # correlation with the relief of a face: faces have 0.67 and more, balls, boxes and backs of heads 0.4
 POOR = 2.6  # mm on a head of the reference's size: a mean distance in the face above which there is none
 
 
