@@ -12,7 +12,7 @@ from ..adapt.smooth_system import laplacian
 from ..anatomy.head import Head
 from ..mesh import vertex_normals
 
-#: Thickness of the flesh, mm (the cheek's, between that over the zygoma and that over the molars; tissue_depth.csv).
+#: Thickness of the flesh, mm: our own estimate for the middle of the cheek, of which the table of tissue depths has no row.
 FLESH = 14.0
 ROUNDS = 30  # smoothing steps: flesh spreads what presses it over about its own thickness
 LEAVES = ("inner", "lip_upper", "lip_lower", "nose", "neck", "scalp", "forehead")
