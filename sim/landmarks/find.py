@@ -31,7 +31,6 @@ OWN = set("v op eu g n se ps pi ex ft ac sbal li ch sa sba pa obs".split())
 TRIED = 10  # placements that are looked at closely
 RIVAL, RIVALS = 1.25, 3  # placements that fit this much worse at first may be right: so many are followed
 TRIAL_MODES = 40
-UNLIKE = 3.9  # mm: the same for the undeformed face, where four fifths fit best
 RELIEF = 0.53  # correlation with the relief of a face: faces have 0.67 and more, balls, boxes and backs of heads 0.4
 POOR = 2.6  # mm on a head of the reference's size: a mean distance in the face above which there is none
 
@@ -115,7 +114,7 @@ def find_landmarks(mesh: Mesh, reference: Head | None = None, unit_scales=(1.0,)
     if not results:
         raise InputError(NO_FACE)
     misfit, scale, fit, target = min(results, key=lambda t: t[0])
-    if misfit > POOR or fit.pose.misfit > UNLIKE or _likeness(reference, space, fit) < RELIEF:
+    if misfit > POOR or _likeness(reference, space, fit) < RELIEF:
         raise InputError(NO_FACE)
     fit, _ = yield from _run(fit_expression(space, target, fit), 0.8, 0.9, "Looking at lips and lids")
     positions = picked(space, fit, target)
