@@ -110,12 +110,12 @@ def find_landmarks(mesh: Mesh, reference: Head | None = None, unit_scales=(1.0,)
             fit = yield from _run(work, low, high, "Fitting a face")
         except NoFaceError:
             continue
-        results.append((_misfit(space, fit), scale, fit, target))
+        misfit, likeness = _misfit(space, fit), _likeness(reference, space, fit)
+        if misfit <= POOR and likeness >= RELIEF:
+            results.append((misfit / likeness, misfit, scale, fit, target))
     if not results:
         raise InputError(NO_FACE)
-    misfit, scale, fit, target = min(results, key=lambda t: t[0])
-    if misfit > POOR or _likeness(reference, space, fit) < RELIEF:
-        raise InputError(NO_FACE)
+    _, misfit, scale, fit, target = min(results, key=lambda t: t[0])
     fit, _ = yield from _run(fit_expression(space, target, fit), 0.8, 0.9, "Looking at lips and lids")
     positions = picked(space, fit, target)
     confidence, mid_air, missing = judge(space, fit, target, positions)
