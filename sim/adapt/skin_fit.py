@@ -22,6 +22,7 @@ from .thin_plate_spline import ThinPlateSpline, similarity
 
 EAR_MARKS = ("sa", "sba", "pra", "pa", "obs", "obi", "t")
 STIFF = tuple(f"{x}_{s}" for x in ("lid_upper", "lid_lower", "nostril") for s in ("l", "r"))
+MOST_MARKS = 5  # of an ear's own landmarks: with so many it is taken as seen
 AROUND_EAR = 9.0  # mm
 BESIDE_EAR = 6.0  # mm from an ear in its place to data that shows it
 SHOWN = 0.7  # share of an ear with such data from which on it counts as seen
@@ -70,14 +71,14 @@ def landmark_rows(points: SurfacePoints, names, n: int) -> csr_matrix:
 
 
 def seen_ears(reference: Head, given, skin: np.ndarray, target: Surface) -> dict[str, bool]:
-    """Side -> whether that ear is in the scan: two or more of its own landmarks are ``given``, or one, and most of the
-    ear as warped there (``skin`` (n, 3) mm) has data facing the same way beside it."""
+    """Side -> whether that ear is in the scan: most of its own landmarks are ``given``, or some, and most of the ear as
+    warped there (``skin`` (n, 3) mm) has data facing the same way beside it. Under hair only some can be placed."""
     out = {}
     for side in ("l", "r"):
         marks = sum(f"{m}_{side}" in given for m in EAR_MARKS)
-        out[side] = marks >= 2
+        out[side] = marks >= MOST_MARKS
         ear = np.flatnonzero(group(reference, f"ear_{side}") > 0.5)
-        if marks == 1 and len(ear):
+        if 1 <= marks < MOST_MARKS and len(ear):
             normal = vertex_normals(skin, reference.skin.triangles)
             found = target.ranked(skin[ear], normal[ear], BESIDE_EAR, 0.5)
             out[side] = bool((found.found & ~found.border).mean() > SHOWN)

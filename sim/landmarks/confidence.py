@@ -6,13 +6,16 @@ from scipy.spatial import cKDTree
 
 from ..adapt.closest import Surface
 from ..adapt.completion import sigma
+from ..adapt.skin_fit import EAR_MARKS, MOST_MARKS
 from .shape_fit import ShapeFit
 from .shape_space import ShapeSpace
+from .sure import SURE
 
 AROUND = 9.0  # mm: skin about a landmark that must have data
 MID_AIR = 3.0  # mm: a landmark farther from the scan hangs in mid-air
 LOST = 11.0  # mm: a landmark less certain than that is missing
 UNSURE = 8.0  # mm of doubt that halve the confidence
+SLIT = 0.5  # opening of lids against the reference's below which open eyes were not read well
 UNSEEN = ("tr",)  # no shape tells where hair begins
 
 
@@ -48,3 +51,27 @@ def judge(space: ShapeSpace, fit: ShapeFit, target: Surface, positions):
     for n in mid_air:
         confidence[n] *= 0.4
     return confidence, mid_air, missing
+
+
+def judge_together(positions, confidence, mid_air, rest, shut) -> dict[str, float]:
+    """Confidence with those lowered that only look sure one by one: on ears under hair, of which few landmarks can be
+    placed, and on lids that nearly meet although the eye is not among the ``shut`` sides.
+
+    rest : the reference's own landmarks, name -> mm
+    """
+    out = dict(confidence)
+    for side in ("l", "r"):
+        ear = [f"{n}_{side}" for n in EAR_MARKS if f"{n}_{side}" in out]
+        weak = sum(out[n] >= SURE and n not in mid_air for n in ear) < MOST_MARKS
+        lids = [f"{n}_{side}" for n in ("ps", "pi", "en", "ex")]
+        slit = side not in shut and all(n in positions for n in lids)
+        slit = slit and _opening(positions, lids) < SLIT * _opening(rest, lids)
+        for name in (ear if weak else []) + (lids[:2] if slit else []):
+            if name in out:
+                out[name] = min(out[name], 0.9 * SURE)
+    return out
+
+
+def _opening(places, lids):
+    ps, pi, en, ex = (places[n] for n in lids)
+    return np.linalg.norm(ps - pi) / max(np.linalg.norm(en - ex), 1e-9)

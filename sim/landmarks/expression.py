@@ -57,6 +57,18 @@ def lips_parted(space: ShapeSpace, free: ShapeFit, target: Surface) -> bool:
     return bool(np.median(gap) > GAP and np.median(foremost) < -BEHIND)
 
 
+def meeting_lids(space: ShapeSpace, fit: ShapeFit, target: Surface, shut) -> dict[str, np.ndarray]:
+    """Name -> (3,) mm: ``ps`` and ``pi`` of the eyes that are ``shut``, in one place where their lids meet."""
+    marks = space.landmarks(fit.points)
+    out = {}
+    for side in shut:
+        middle = (marks[f"ps_{side}"] + marks[f"pi_{side}"]) / 2
+        found = target.closest(middle[None], FAR * fit.pose.scale)
+        place = found.points[0] if found.found[0] else middle
+        out |= {f"ps_{side}": place, f"pi_{side}": place}
+    return out
+
+
 def eyes(space: ShapeSpace) -> np.ndarray:
     """(n,) bool, the skin around the eyes."""
     marks = space.landmarks(space.points)

@@ -15,8 +15,8 @@ from ..errors import InputError
 from ..mesh import Mesh, vertex_normals
 from ..progress import Progress, Work, portion
 from ..scan.face_match import face_template, surface_samples
-from .confidence import judge
-from .expression import fit_expression
+from .confidence import judge, judge_together
+from .expression import fit_expression, meeting_lids
 from .picked import picked
 from .pose_search import search_poses
 from .shape_fit import TRIAL, NoFaceError, fit_shape
@@ -116,7 +116,7 @@ def find_landmarks(mesh: Mesh, reference: Head | None = None, unit_scales=(1.0,)
     if not results:
         raise InputError(NO_FACE)
     _, misfit, scale, fit, target = min(results, key=lambda t: t[0])
-    fit, _ = yield from _run(fit_expression(space, target, fit), 0.8, 0.9, "Looking at lips and lids")
+    fit, shown = yield from _run(fit_expression(space, target, fit), 0.8, 0.9, "Looking at lips and lids")
     positions = picked(space, fit, target)
     confidence, mid_air, missing = judge(space, fit, target, positions)
     positions = {n: p for n, p in positions.items() if n not in missing}
@@ -124,6 +124,8 @@ def find_landmarks(mesh: Mesh, reference: Head | None = None, unit_scales=(1.0,)
     seen = Mesh.from_triangles(target.vertices, target.triangles)
     other = yield from portion(weighed(seen, positions, confidence, reference, target), 0.9, 1.0)
     positions = {n: p if n.partition("_")[0] in OWN else other[n] for n, p in positions.items()}
+    positions |= {n: p for n, p in meeting_lids(space, fit, target, shown.shut).items() if n in positions}
+    confidence = judge_together(positions, confidence, mid_air, reference.landmark_positions(), shown.shut)
     return FoundLandmarks(positions, confidence, mid_air, missing, scale, misfit)
 
 
