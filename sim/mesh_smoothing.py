@@ -8,10 +8,10 @@ from .mesh import edges
 from .mesh_piercing import self_piercings
 
 STEP = 0.2  # of the way to the middle of the neighbours, in a round
-FAR = 0.8  # mm that a vertex may move in all
+FAR = 1.6  # mm that a vertex may move in all
 
 
-def smoothed_free(vertices, triangles, rounds: int = 20):
+def smoothed_free(vertices, triangles, rounds: int = 40):
     """Vertices (n, 3) mm of the mesh with ``triangles`` (m, 3), smoothed around those that pierce others.
 
     What so little does not free is returned with the fewest piercings found.
