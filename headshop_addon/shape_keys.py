@@ -13,6 +13,7 @@ import numpy as np
 
 from ..sim.acting.pose import Pose, control
 from ..sim.errors import InputError
+from ..sim.mesh_subdivision import drawn
 from ..sim.progress import Progress, Work
 from ..sim.tissue.model import build_model
 from ..sim.tissue.posing import posed_parts
@@ -28,8 +29,8 @@ STILL = 0.001  # mm: a part that moves less gets no key
 def bake_poses(skin: bpy.types.Object, poses: dict[str, Pose]) -> Work:
     """Simulate each pose until it rests and store it as a shape key; returns name -> report.
 
-    A report holds ``peak_mm``, ``volume_drift``, ``penetration_mm`` and ``converged``. Nothing is written before all
-    poses are simulated: closing the generator leaves the head as it was.
+    A report holds ``peak_mm`` (of the surface drawn), ``volume_drift``, ``penetration_mm`` and ``converged``. Nothing is
+    written before all poses are simulated: closing the generator leaves the head as it was.
 
     Raises
     ------
@@ -48,7 +49,7 @@ def bake_poses(skin: bpy.types.Object, poses: dict[str, Pose]) -> Work:
         solution = solve(model, asked, max_iterations=ITERATIONS)  # from rest: a key must not depend on its neighbours
         posed = posed_parts(model, solution.state, asked)
         shapes[name] = {part: posed[part] - neutral[part] for part in posed}
-        report[name] = _report(solution, shapes[name]["skin"])
+        report[name] = _report(solution, drawn(head.skin.faces, shapes[name]["skin"]))
     yield Progress(1.0, "Writing shape keys")
     write_shapes(skin, shapes, report)
     return report

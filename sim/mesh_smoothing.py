@@ -8,7 +8,7 @@ from .mesh import edges
 from .mesh_piercing import self_piercings
 
 STEP = 0.2  # of the way to the middle of the neighbours, in a round
-FAR = 1.6  # mm that a vertex may move in all
+FAR = 1.4  # mm that a vertex may move in all
 
 
 def smoothed_free(vertices, triangles, rounds: int = 40):

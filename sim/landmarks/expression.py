@@ -5,22 +5,26 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..adapt.closest import Surface
+from ..relax.mouth_gap import lip_edges
+from ..relax.parted import APART
 from .shape_fit import CHANGE, Expression, ShapeFit, fit_shape
 from .shape_space import ShapeSpace
 
 AROUND_EYE = 22.0  # mm
 FAR = 3.0  # mm that a point of the skin without data counts as
+AROUND_MOUTH = 35.0  # mm
 REASON = 0.95  # shut eyes must fit that much better
-MIDDLE = 0.6  # share of the mouth's width in which lips are looked between
-GAP, BEHIND = 2.5, 3.5  # mm: lips so far apart, and nothing but what lies so far behind them, are parted
-DEEP = 16.0  # mm
+PARTED = 0.97  # and so must parted lips
+LOOKED = np.linspace(-0.28, 0.28, 9)  # shares of the way from the middle of the mouth to its corners
+FEW = 25  # percent of them at which lips that are parted may seem closed: noise looks like edges in places only
 
 
 def fit_expression(space: ShapeSpace, target: Surface, fit: ShapeFit):
     """A generator: yields the fraction done, returns the `ShapeFit` and the `Expression` that the scan shows."""
     moved = fit.coefficients + space.parted
     free = yield from _half(fit_shape(space, target, fit.pose, CHANGE, moved, 1, Expression(True)), 0.0)
-    parted = lips_parted(space, free, target)
+    mouth = about_mouth(space)
+    parted = lips_parted(space, free, target) and cost(space, free, mouth) < PARTED * cost(space, fit, mouth)
     fit = free if parted else fit
     shut = Expression(parted, ("l", "r"))
     moved = fit.coefficients + space.shut["l"] + space.shut["r"]
@@ -41,20 +45,15 @@ def _half(work, start):
 
 
 def lips_parted(space: ShapeSpace, free: ShapeFit, target: Surface) -> bool:
-    """Whether the scan shows an open mouth, told by a fit whose lips were ``free`` to part.
+    """Whether the scan shows an open mouth: between the lips of a fit that was ``free`` to part them it has two edges.
 
-    Where closed lips were taken for parted ones, the scan's surface still passes between them.
+    Where closed lips were taken for parted ones, the scan's surface runs from one to the other without a step, but for
+    noise here and there.
     """
-    marks = space.landmarks(space.points)
-    width = MIDDLE * (marks["ch_l"] - marks["ch_r"])[0] / 2
-    upper, lower = (index[np.abs(space.points[space.lips[0], 0]) < width] for index in space.lips)
-    size, front = free.pose.scale, -free.pose.turn[:, 1]
-    middle = (free.points[upper] + free.points[lower]) / 2
-    gap = np.linalg.norm(free.points[upper] - free.points[lower], axis=1) / size
-    line, along, _, _ = target.crossings(middle, np.broadcast_to(front, middle.shape), DEEP * size)
-    foremost = np.full(len(middle), -DEEP)
-    np.maximum.at(foremost, line, along / size)
-    return bool(np.median(gap) > GAP and np.median(foremost) < -BEHIND)
+    forward = -free.pose.turn[:, 1]
+    edges = lip_edges(target, space.landmarks(free.points), forward, LOOKED)
+    apart = np.nan_to_num(np.linalg.norm(edges[:, 0] - edges[:, 1], axis=1))
+    return bool(np.percentile(apart, FEW) > APART * free.pose.scale)
 
 
 def meeting_lids(space: ShapeSpace, fit: ShapeFit, target: Surface, shut) -> dict[str, np.ndarray]:
@@ -74,6 +73,11 @@ def eyes(space: ShapeSpace) -> np.ndarray:
     marks = space.landmarks(space.points)
     middles = [(marks[f"en_{side}"] + marks[f"ex_{side}"]) / 2 for side in "lr"]
     return cKDTree(middles).query(space.points)[0] < AROUND_EYE
+
+
+def about_mouth(space: ShapeSpace) -> np.ndarray:
+    """(n,) bool, the skin around the mouth."""
+    return np.linalg.norm(space.points - space.landmarks(space.points)["sto"], axis=1) < AROUND_MOUTH
 
 
 def cost(space: ShapeSpace, fit: ShapeFit, about) -> float:

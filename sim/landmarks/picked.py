@@ -2,7 +2,8 @@
 """Where somebody would pick the landmarks, seen from where the skin laid on the scan has them.
 
 The reference's own landmarks are vertices of its layout, chosen for the build; people who pick landmarks on scans go by
-what they see (Farkas 1994). Where the two differ, the place is moved along the surface.
+what they see (Farkas 1994). Where the two differ, the place is moved along the surface. How far is a rounded mean over
+landmarks picked on public heads: ICT-FaceKit (Li et al. 2020) and four scans, see the README's sources.
 """
 
 import numpy as np
