@@ -4,6 +4,7 @@
 import bpy
 
 from ..sim.acting import expressions
+from ..sim.acting.models import DEFAULT
 from ..sim.errors import InputError
 from ..sim.progress import Work, portion
 from . import heads, performance, shape_keys
@@ -28,10 +29,10 @@ def poses_of_set(skin: bpy.types.Object, name: str) -> dict:
     raise InputError(f"The set {name} is not in this version: bake --set muscles or --set expressions.")
 
 
-def bake(skin: bpy.types.Object, pose_set: str | None = None, acted=None) -> Work:
-    """Bake a set of poses, a performance (`sim.acting.performance`), or both; returns the head's whole report.
+def bake(skin: bpy.types.Object, pose_set: str | None = None, acted=None, model: str = DEFAULT) -> Work:
+    """Bake a set of poses, a performance (`sim.acting.performance`), or both, by a model (`sim.acting.models`).
 
-    A performance sets the scene's frame rate and range to its own.
+    Returns the head's whole report. A performance sets the scene's frame rate and range to its own.
     """
     report = heads.read_report(skin)
     seconds = dict(report.get("seconds", {}))
@@ -39,10 +40,10 @@ def bake(skin: bpy.types.Object, pose_set: str | None = None, acted=None) -> Wor
     shapes = acting = None
     if pose_set is not None:
         with timed(seconds, f"bake_{pose_set}"):
-            shapes = yield from portion(shape_keys.bake_poses(skin, poses_of_set(skin, pose_set)), 0.0, border)
+            shapes = yield from portion(shape_keys.bake_poses(skin, poses_of_set(skin, pose_set), model), 0.0, border)
     if acted is not None:
         with timed(seconds, "bake_performance"):
-            acting = yield from portion(bake_acted(skin, acted), 0.0 if pose_set is None else border, 1.0)
+            acting = yield from portion(bake_acted(skin, acted, model=model), 0.0 if pose_set is None else border, 1.0)
     if shapes is not None:
         report["shapes"] = shape_keys.baked_report(skin)
     if acting is not None:
@@ -53,11 +54,11 @@ def bake(skin: bpy.types.Object, pose_set: str | None = None, acted=None) -> Wor
     return report
 
 
-def bake_acted(skin: bpy.types.Object, acted, scene: bpy.types.Scene | None = None) -> Work:
+def bake_acted(skin: bpy.types.Object, acted, scene: bpy.types.Scene | None = None, model: str = DEFAULT) -> Work:
     """Bake a performance from frame 1 on, at its own frame rate, which becomes the scene's."""
     scene = scene or bpy.context.scene
     poses = acted.frames()
-    report = yield from performance.bake_performance(skin, poses)
+    report = yield from performance.bake_performance(skin, poses, model=model)
     scene.render.fps, scene.render.fps_base = round(acted.fps), round(acted.fps) / acted.fps
     scene.frame_start, scene.frame_end = 1, max(len(poses), 1)
     return report

@@ -11,6 +11,7 @@ import signal
 import sys
 from contextlib import contextmanager
 
+from ..sim.acting import models
 from ..sim.errors import InputError
 
 INTERRUPTED = 130
@@ -66,9 +67,14 @@ def parser() -> argparse.ArgumentParser:
     bake = command("bake", "Simulate poses or a performance into shape keys.", chosen, plain)
     bake.add_argument("--set", choices=SETS, dest="poses", help="simulate each pose of a set into a shape key")
     bake.add_argument("--performance", metavar="FILE", help="simulate a performance into shape key animation")
+    about = "the model that acts: " + ", ".join(f"{m.name} ({m.title})" for m in models.MODELS.values())
+    about += f" (default: {models.DEFAULT})"
+    bake.add_argument("--model", choices=tuple(models.MODELS), default=models.DEFAULT, metavar="NAME", help=about)
     bake.add_argument("-o", "--output", metavar="OUT.blend", help="(default: HEAD.blend itself)")
 
     render = command("render", "Render a contact sheet or an animation.", chosen)
+    about = "an expression of the table (default: smile) by each model side by side (PNG)"
+    render.add_argument("--models", nargs="?", const="smile", metavar="EXPRESSION", help=about)
     render.add_argument("--fit", action="store_true", help="the distance from the scan as a heat map (PNG)")
     render.add_argument("-o", "--output", required=True, metavar="SHEET.png|MOVIE.mp4")
 

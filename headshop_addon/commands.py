@@ -88,7 +88,7 @@ def bake(options) -> None:
         skin = _open(options)
         from . import baking
 
-        report = _run(baking.bake(skin, options.poses, performance), options)
+        report = _run(baking.bake(skin, options.poses, performance, options.model), options)
         _save(blend)
         _write_plain(skin, plain, outputs)
     if not options.quiet:
@@ -98,19 +98,27 @@ def bake(options) -> None:
 def render(options) -> None:
     """A contact sheet or a movie."""
     _require_head_file(options.head)
-    kind = _require_kind(options.output, _PICTURES[:1] if options.fit else _PICTURES)
+    if options.fit and options.models is not None:
+        raise InputError("A sheet shows either the fit or the models: give --fit or --models.")
+    still = options.fit or options.models is not None
+    kind = _require_kind(options.output, _PICTURES[:1] if still else _PICTURES)
     with Outputs() as outputs:
         picture = outputs.file(options.output)
         skin = _open(options)
+        wanted = {}
         if options.fit:
             from .heat_sheet import render_fit as render_it
+        elif options.models is not None:
+            from .model_sheet import render_models as render_it
+
+            wanted = {"expression": options.models}
         elif kind == ".png":
             from .contact_sheet import render_sheet as render_it
         else:
             from .movie import render_movie as render_it
         if not options.fit:
             _wake_cycles()
-        _run(render_it(skin, picture), options)
+        _run(render_it(skin, picture, **wanted), options)
     if not options.quiet:
         print(options.output)
 

@@ -50,7 +50,7 @@ def render_fit(skin: bpy.types.Object, path, limit: float = LIMIT) -> Work:
     for number, (title, yaw) in enumerate(VIEWS):
         yield Progress((number + 0.5) / (len(VIEWS) + 1), f"Drawing the fit, {title.lower()}")
         left = number * WIDTH
-        page[HEAD : HEAD + HEIGHT, left : left + WIDTH, :3] = _picture(vertices, triangles, colours, middle, yaw)
+        page[HEAD : HEAD + HEIGHT, left : left + WIDTH, :3] = drawn_view(vertices, triangles, colours, middle, yaw)
         put_text(page, title, left + WIDTH / 2, HEAD + HEIGHT - 8, 20, DIM, "centre")
     _scale(page, limit)
     sentence = heads.read_report(skin).get("fit", {}).get("sentence", "")
@@ -61,9 +61,13 @@ def render_fit(skin: bpy.types.Object, path, limit: float = LIMIT) -> Work:
     return path
 
 
-def _picture(vertices, triangles, colours, middle, yaw) -> np.ndarray:
-    """(HEIGHT, WIDTH, 3) of the coloured surface, shaded a little, twice as fine and averaged."""
-    view = Viewpoint.around(middle, yaw, 0.03, 1500.0, MM / 2, WIDTH * MM, HEIGHT * MM)
+def drawn_view(vertices, triangles, colours, middle, yaw, width=WIDTH, height=HEIGHT) -> np.ndarray:
+    """(height, width, 3) of the coloured surface, shaded a little, twice as fine and averaged.
+
+    vertices (n, 3) mm along the head's axes, triangles (t, 3), colours (n, 3) sRGB; middle (3,) mm: what the picture is
+    centred on; yaw rad toward the subject's left
+    """
+    view = Viewpoint.around(middle, yaw, 0.03, 1500.0, MM / 2, width * MM, height * MM)
     seen = depth_map(view, vertices, triangles)
     image = np.empty((view.height, view.width, 3), dtype=np.float32)
     image[:] = PAGE
@@ -72,7 +76,7 @@ def _picture(vertices, triangles, colours, middle, yaw) -> np.ndarray:
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-9)
     light = np.abs(normal @ view.axes[2])
     image[where] = seen.sample(colours, triangles, where) * (0.35 + 0.65 * light[:, None])
-    return image.reshape(HEIGHT, 2, WIDTH, 2, 3).mean(axis=(1, 3))
+    return image.reshape(height, 2, width, 2, 3).mean(axis=(1, 3))
 
 
 def _scale(page, limit) -> None:

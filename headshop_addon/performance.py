@@ -9,12 +9,11 @@ import json
 import bpy
 import numpy as np
 
+from ..sim.acting.models import DEFAULT, model_named
 from ..sim.acting.pose import CONTROLS, Pose, control
 from ..sim.acting.principal import principal_shapes
 from ..sim.progress import Progress, Work
-from ..sim.tissue.model import build_model
 from ..sim.tissue.posing import posed_parts
-from ..sim.tissue.solver import rest_state, solve
 from . import bridge, heads, shape_keys
 from .slotted_actions import animate_keys, curves_of, new_action, stop_keys
 
@@ -51,39 +50,47 @@ def keyed_poses(skin: bpy.types.Object, frames) -> list[Pose]:
 
 
 def bake_performance(
-    skin: bpy.types.Object, poses: list[Pose], first_frame: int = 1, name: str = "Performance"
+    skin: bpy.types.Object,
+    poses: list[Pose],
+    first_frame: int = 1,
+    name: str = "Performance",
+    model: str = DEFAULT,
 ) -> Work:
     """Simulate ``poses``, one a frame from ``first_frame`` on, into animated shape keys; returns a report.
 
-    Each frame starts from the one before. The report holds ``frames``, ``converged`` (frames), ``keys`` (part ->
-    count), ``error_mm`` (of the compression) and ``peak_mm``. Nothing is written before all is simulated. An earlier
+    Each frame starts from the one before. The report holds ``model``, ``frames``, ``converged`` (frames), ``keys``
+    (part -> count), ``error_mm`` (of the compression) and ``peak_mm``. Nothing is written before all is simulated. An earlier
     performance of the head is replaced; its other shape keys stay.
+
+    model : name of the model that acts (`sim.acting.models`)
 
     Raises
     ------
-    InputError : not a whole head, or linked from another file.
+    InputError : no such model, not a whole head, or linked from another file.
     """
+    acting = model_named(model)
     shape_keys.require_editable(skin)
     yield Progress(0.0, "Building the tissue")
     head = heads.read_head(skin)
-    model = build_model(head)
-    state = rest_state(model)
-    neutral = posed_parts(model, state, control(model, Pose()))
+    built = acting.build(head)
+    state = acting.rest_state(built)
+    neutral = posed_parts(built, state, control(built, Pose()))
     motion = {part: np.empty((len(poses), *points.shape), dtype=np.float32) for part, points in neutral.items()}
     converged = 0
     for number, pose in enumerate(poses):
         yield Progress(0.05 + 0.9 * number / len(poses), f"Simulating frame {number + 1} of {len(poses)}")
-        asked = control(model, pose)
-        solution = solve(model, asked, state, max_iterations=ITERATIONS)
+        asked = control(built, pose)
+        solution = acting.solve(built, asked, state, max_iterations=ITERATIONS)
         state = solution.state
         converged += bool(solution.converged)
-        for part, points in posed_parts(model, state, asked).items():
+        for part, points in posed_parts(built, state, asked).items():
             motion[part][number] = points - neutral[part]
     yield Progress(0.96, "Compressing")
     found = {p: principal_shapes(m, TOLERANCE) for p, m in motion.items() if np.abs(m).max(initial=0.0) > TOLERANCE}
     yield Progress(1.0, "Writing shape keys")
     write_performance(skin, found, np.arange(first_frame, first_frame + len(poses)), name)
     return {
+        "model": model,
         "frames": len(poses),
         "converged": converged,
         "keys": {part: len(each.shapes) for part, each in found.items()},

@@ -11,13 +11,12 @@ import json
 import bpy
 import numpy as np
 
+from ..sim.acting.models import DEFAULT, model_named
 from ..sim.acting.pose import Pose, control
 from ..sim.errors import InputError
 from ..sim.mesh_subdivision import drawn
 from ..sim.progress import Progress, Work
-from ..sim.tissue.model import build_model
 from ..sim.tissue.posing import posed_parts
-from ..sim.tissue.solver import rest_state, solve
 from . import bridge, heads
 
 SHAPES = "headshop_shapes"
@@ -26,30 +25,35 @@ ITERATIONS = 200  # until it rests, not until it looks right
 STILL = 0.001  # mm: a part that moves less gets no key
 
 
-def bake_poses(skin: bpy.types.Object, poses: dict[str, Pose]) -> Work:
+def bake_poses(skin: bpy.types.Object, poses: dict[str, Pose], model: str = DEFAULT) -> Work:
     """Simulate each pose until it rests and store it as a shape key; returns name -> report.
 
-    A report holds ``peak_mm`` (of the surface drawn), ``volume_drift``, ``penetration_mm`` and ``converged``. Nothing is
-    written before all poses are simulated: closing the generator leaves the head as it was.
+    A report holds ``model``, ``peak_mm`` (of the surface drawn), ``volume_drift``, ``penetration_mm`` and ``converged``.
+    Nothing is written before all poses are simulated: closing the generator leaves the head as it was.
+
+    model : name of the model that acts (`sim.acting.models`)
 
     Raises
     ------
-    InputError : not a whole head, linked from another file, or the artist has a key of his own by one of the names.
+    InputError : no such model, not a whole head, linked from another file, or the artist has a key of his own by one of
+        the names.
     """
+    acting = model_named(model)
     require_editable(skin)
     _refuse_foreign(skin, poses)
     yield Progress(0.0, "Building the tissue")
     head = heads.read_head(skin)
-    model = build_model(head)
-    neutral = posed_parts(model, rest_state(model), control(model, Pose()))
+    built = acting.build(head)
+    neutral = posed_parts(built, acting.rest_state(built), control(built, Pose()))
     shapes, report = {}, {}
     for number, (name, pose) in enumerate(poses.items()):
         yield Progress(0.1 + 0.9 * number / len(poses), f"Simulating {name}")
-        asked = control(model, pose)
-        solution = solve(model, asked, max_iterations=ITERATIONS)  # from rest: a key must not depend on its neighbours
-        posed = posed_parts(model, solution.state, asked)
+        asked = control(built, pose)
+        # from rest: a key must not depend on its neighbours
+        solution = acting.solve(built, asked, max_iterations=ITERATIONS)
+        posed = posed_parts(built, solution.state, asked)
         shapes[name] = {part: posed[part] - neutral[part] for part in posed}
-        report[name] = _report(solution, drawn(head.skin.faces, shapes[name]["skin"]))
+        report[name] = {"model": model} | _report(solution, drawn(head.skin.faces, shapes[name]["skin"]))
     yield Progress(1.0, "Writing shape keys")
     write_shapes(skin, shapes, report)
     return report

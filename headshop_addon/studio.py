@@ -51,8 +51,9 @@ class Model:
         self.skin, self.frame = skin, frame
         self.sets: dict[str, bpy.types.Collection] = {}
         self._shapes: dict[bpy.types.Object, dict[str, np.ndarray]] = {}
+        self._parts: dict[str, bpy.types.Object] = {}
         for part, obj in heads.parts_of(skin).items():
-            self._add(scene, _SETS[part], obj)
+            self._parts[part] = self._add(scene, _SETS[part], obj)
         for obj in heads.muscles_of(skin).values():
             self._add(scene, "muscles", obj)
         self.scan = heads.scan_of(skin)
@@ -94,6 +95,13 @@ class Model:
             for obj in self.sets[name].objects:
                 shapes = self._shapes[obj]
                 write_positions(obj, shapes.get(key, shapes[""]))
+
+    def move(self, deltas: dict[str, np.ndarray]) -> None:
+        """Put parts at rest plus ``deltas`` (part -> (n, 3) mm in the skin's space); the parts not named stay."""
+        for part, delta in deltas.items():
+            copy = self._parts[part]
+            turn = np.linalg.inv(heads.placement(self.skin, heads.parts_of(self.skin)[part])[:3, :3]).T
+            write_positions(copy, self._shapes[copy][""] + delta @ turn)
 
 
 def _cut(obj: bpy.types.Object, to_local, frame: Portrait) -> None:

@@ -123,7 +123,7 @@ def test_a_simulated_performance_plays_without_the_extension(
 ):
     from headshop.sim.acting.pose import Pose
 
-    monkeypatch.setattr(performance, "build_model", lambda head: reference_model)
+    monkeypatch.setattr("headshop.sim.tissue.model.build_model", lambda head: reference_model)
 
     poses = [Pose({"zygomaticus_major_l": k / 4}, jaw_open=k / 8) for k in range(5)]
     report = finish(performance.bake_performance(skin, poses))

@@ -85,14 +85,14 @@ def test_a_bake_is_the_simulation(skin, shape_keys, reference_model):
     # Blender keeps single precision, which is enough for lips in contact to rest a little elsewhere.
     off = np.linalg.norm(bridge.read_positions(skin, "grin") - truth, axis=1)
     assert off.max() < 0.1 and np.sqrt((off**2).mean()) < 0.005, (off.max(), np.sqrt((off**2).mean()))
-    assert report["grin"].keys() == {"peak_mm", "volume_drift", "penetration_mm", "converged"}
+    assert report["grin"].keys() == {"model", "peak_mm", "volume_drift", "penetration_mm", "converged"}
     assert report["grin"]["peak_mm"] > 2 and report["nothing"]["peak_mm"] < 0.1
 
 
 def test_a_cancelled_bake_leaves_no_trace(skin, shape_keys, reference_model, monkeypatch):
     from headshop.sim.acting.pose import Pose
 
-    monkeypatch.setattr(shape_keys, "build_model", lambda head: reference_model)
+    monkeypatch.setattr("headshop.sim.tissue.model.build_model", lambda head: reference_model)
 
     work = shape_keys.bake_poses(skin, {"a": Pose(jaw_open=0.2), "b": Pose(jaw_open=0.4)})
     steps = [next(work) for _ in range(3)]

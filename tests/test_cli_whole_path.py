@@ -14,7 +14,7 @@ from headshop.sim.adapt.landmarks import write_landmarks
 from headshop.sim.anatomy.seen_skin import seen_skin
 from headshop.sim.scan.ply import read_ply, write_ply
 
-SHAPE = {"peak_mm", "volume_drift", "penetration_mm", "converged"}
+SHAPE = {"model", "peak_mm", "volume_drift", "penetration_mm", "converged"}
 
 
 @pytest.fixture(scope="module")

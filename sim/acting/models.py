@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The models that can act a head: this product's own and those of its sources, by name and with one interface.
+
+A model is a package of `sim` with two modules: ``model`` holds ``build_model(head)``; ``solver`` holds
+``rest_state(model)`` and ``solve(model, control, state=None, *, max_iterations, tolerance)``, with `structures.Control` in
+and `structures.Solution` out. What is built has what `pose.control` and `posing.posed_parts` read (``muscle_names``,
+``count``, ``jaw``, ``eyes``, ``rigid``), a state has ``skin`` (n, 3) mm. Packages are imported when they are asked for.
+"""
+
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Any
+
+from ..anatomy.head import Head
+from ..errors import InputError
+from ..tissue.structures import Control, Solution
+
+
+@dataclass(frozen=True)
+class ActingModel:
+    """A model by its ``name`` on the command line, its ``title`` on a sheet, and its ``package`` under `sim`."""
+
+    name: str
+    title: str
+    package: str
+
+    def build(self, head: Head) -> Any:
+        """All that is made of a head once."""
+        return self._module("model").build_model(head)
+
+    def rest_state(self, model) -> Any:
+        """The head itself, at rest."""
+        return self._module("solver").rest_state(model)
+
+    def solve(self, model, control: Control, state=None, **limits) -> Solution:
+        """The pose at rest; ``state`` is where to start, ``limits`` are max_iterations and tolerance (mm)."""
+        return self._module("solver").solve(model, control, state, **limits)
+
+    def _module(self, name: str):
+        return import_module(f"..{self.package}.{name}", __package__)
+
+
+DEFAULT = "headshop"
+
+MODELS = {model.name: model for model in (ActingModel("headshop", "Head Shop", "tissue"),)}
+
+
+def model_named(name: str = DEFAULT) -> ActingModel:
+    """The model called ``name``.
+
+    Raises
+    ------
+    InputError : there is none.
+    """
+    if name not in MODELS:
+        raise InputError(f"There is no model {name!r}: choose {' or '.join(MODELS)}.")
+    return MODELS[name]

@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Every model by name: one interface, the neutral face exactly the scan, the same smile up and out."""
+
+import numpy as np
+import pytest
+
+from headshop.headshop_addon.command_line import main
+from headshop.sim.acting.models import DEFAULT, MODELS, model_named
+from headshop.sim.acting.pose import Pose, control
+from headshop.sim.errors import InputError
+from headshop.sim.tissue.posing import posed_parts
+
+
+@pytest.fixture(scope="module", params=MODELS)
+def acting(request, reference, reference_model):
+    """A model of the table and what it builds of the reference head."""
+    found = model_named(request.param)
+    return found, reference_model if found.name == DEFAULT else found.build(reference)
+
+
+def test_unknown_models_are_refused():
+    with pytest.raises(InputError, match="no model 'clay'"):
+        model_named("clay")
+
+
+def test_neutral_is_the_head_itself(acting, reference):
+    found, model = acting
+    asked = control(model, Pose())
+    for state in (found.rest_state(model), found.solve(model, asked).state):
+        for name, vertices in posed_parts(model, state, asked).items():
+            assert np.abs(vertices - reference.parts[name].vertices).max() < 1e-9
+
+
+def test_a_smile_pulls_the_corners_up_and_out(acting, reference):
+    found, model = acting
+    solution = found.solve(model, control(model, Pose({"zygomaticus_major_l": 1.0, "zygomaticus_major_r": 1.0})))
+    assert {"residual", "volume_drift", "penetration_mm", "peak_mm"} <= solution.diagnostics.keys()
+    assert 5 < solution.diagnostics["peak_mm"] < 20
+    marks = reference.landmarks
+    corner = marks.names.index("ch_l")
+    moved = marks.weights[corner] @ (solution.state.skin - reference.skin.vertices)[marks.corners[corner]]
+    assert moved[2] > 3 and moved[0] > 0.5
+
+
+def test_the_jaw_takes_the_chin_along(acting, reference):
+    found, model = acting
+    asked = control(model, Pose(jaw_open=0.5))
+    posed = posed_parts(model, found.solve(model, asked).state, asked)
+    marks = reference.landmarks
+    for name, low, high in (("pg", -30, -10), ("sn", -2, 2)):
+        row = marks.names.index(name)
+        moved = marks.weights[row] @ (posed["skin"] - reference.skin.vertices)[marks.corners[row]]
+        assert low < moved[2] < high, name
+
+
+def test_the_command_line_names_the_models(tmp_path, capsys):
+    head = tmp_path / "head.blend"
+    head.write_bytes(b"x")
+    assert main(["bake", str(head), "--set", "muscles", "--model", "clay"]) == 2
+    said = capsys.readouterr().err
+    assert all(name in said for name in ("--model", *MODELS))
+    assert main(["render", str(head), "--models", "--fit", "-o", str(tmp_path / "x.png")]) == 2
+    assert main(["render", str(head), "--models", "-o", str(tmp_path / "x.mp4")]) == 2
+    assert ".png" in capsys.readouterr().err
