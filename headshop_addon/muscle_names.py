@@ -30,6 +30,14 @@ CONTROLS = {
     "blink_r": ("Blink Right", 0.0, "Right lids closed"),
     "gaze_x": ("Look Sideways", -1.0, "Both eyes turned to the subject's left"),
     "gaze_z": ("Look Up", -1.0, "Both eyes turned up"),
+    "gaze_l_x": ("Left Eye Sideways", -1.0, "Left eye turned to the subject's left, besides both"),
+    "gaze_l_z": ("Left Eye Up", -1.0, "Left eye turned up, besides both"),
+    "gaze_r_x": ("Right Eye Sideways", -1.0, "Right eye turned to the subject's left, besides both"),
+    "gaze_r_z": ("Right Eye Up", -1.0, "Right eye turned up, besides both"),
+    "lip_upper_forward": ("Upper Lip Forward", -1.0, "Where the sphincter of the upper lip pulls it when contracted"),
+    "lip_lower_forward": ("Lower Lip Forward", -1.0, "Where the sphincter of the lower lip pulls it when contracted"),
+    "cheek_puff": ("Puff Cheeks", -1.0, "Pressure of the air in the mouth; negative sucks the cheeks in"),
+    "lips_together": ("Lips Together", 0.0, "Lips held together where they touch, also over an open jaw"),
 }
 
 

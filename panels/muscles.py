@@ -40,9 +40,9 @@ class _Sliders(SidebarPanel):
 
 
 class HEADSHOP_PT_controls(_Sliders, bpy.types.Panel):
-    """Jaw, lids, gaze."""
+    """Jaw, lids, gaze, lips and cheeks."""
 
-    bl_label = "Jaw, Lids and Gaze"
+    bl_label = "Jaw, Eyes, Lips and Cheeks"
 
     def draw(self, context):
         """The jaw above, then left and right beside each other as on the screen."""
@@ -57,6 +57,13 @@ class HEADSHOP_PT_controls(_Sliders, bpy.types.Panel):
         row = self.layout.row(align=True)
         row.prop(group, "gaze_x", text="Look Side")
         row.prop(group, "gaze_z", text="Look Up")
+        for side, label in (("r", "R"), ("l", "L")):
+            row = self.layout.row(align=True)
+            row.prop(group, f"gaze_{side}_x", text=f"Eye {label} Side")
+            row.prop(group, f"gaze_{side}_z", text=f"Eye {label} Up")
+        column = self.layout.column(align=True)
+        for name in ("lip_upper_forward", "lip_lower_forward", "lips_together", "cheek_puff"):
+            column.prop(group, name)
 
 
 def _draw_region(self, context):

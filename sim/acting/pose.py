@@ -8,8 +8,14 @@ import numpy as np
 from ..errors import InputError
 from ..tissue.structures import Control, Model
 
+#: What one eye turns besides `gaze_x` and `gaze_z`; the centre of each lip's sphincter.
+EYES = ("gaze_l_x", "gaze_l_z", "gaze_r_x", "gaze_r_z")
+LIPS = ("lip_upper_forward", "lip_lower_forward")
 #: The controls that are not muscles.
-CONTROLS = ("jaw_open", "jaw_forward", "jaw_side", "blink_l", "blink_r", "gaze_x", "gaze_z")
+CONTROLS = (
+    *("jaw_open", "jaw_forward", "jaw_side", "blink_l", "blink_r", "gaze_x", "gaze_z", *EYES),
+    *(*LIPS, "lips_together", "cheek_puff"),
+)
 
 #: What gaze 1.0 means, rad (Ekman, Friesen and Hager 2002, AU 61 to 64: eyes to the side 35, up or down 25 degrees).
 GAZE_REACH = np.radians([35.0, 25.0])
@@ -37,7 +43,9 @@ _SIDE_WORK = 0.6
 
 @dataclass(frozen=True)
 class Pose:
-    """muscles: name -> 0..1; jaw_open 0..1, jaw_forward and jaw_side -1..1; blink 0..1; gaze -1..1 (left, up)."""
+    """muscles: name -> 0..1; jaw_open 0..1, jaw_forward and jaw_side -1..1; blink 0..1; gaze -1..1 (left, up), of both eyes
+    and of each besides;    lips' sphincter centres -1..1 (back, forward); cheek_puff -1..1;
+    lips_together 0..1."""
 
     muscles: dict[str, float] = field(default_factory=dict)
     jaw_open: float = 0.0
@@ -47,6 +55,14 @@ class Pose:
     blink_r: float = 0.0
     gaze_x: float = 0.0
     gaze_z: float = 0.0
+    gaze_l_x: float = 0.0
+    gaze_l_z: float = 0.0
+    gaze_r_x: float = 0.0
+    gaze_r_z: float = 0.0
+    lip_upper_forward: float = 0.0
+    lip_lower_forward: float = 0.0
+    cheek_puff: float = 0.0
+    lips_together: float = 0.0
 
     def values(self) -> dict[str, float]:
         """Channel name -> value: every muscle named, and all of `CONTROLS`."""
@@ -95,9 +111,15 @@ def control(model: Model, pose: Pose) -> Control:
         lids[k] = sum(of(base, side) * np.array(work) for base, work in _LID_WORK.items())
         shut = float(np.clip(blink, 0, 1))
         lids[k] = lids[k] * (1 - shut) + shut
+    gaze = np.clip([pose.gaze_x, pose.gaze_z], -1, 1)
+    each = np.reshape([getattr(pose, name) for name in EYES], (2, 2))
     return Control(
         activations=activation,
         jaw=np.array([opening, np.clip(forward, -1, 1), np.clip(aside, -1, 1)]),
         lids=lids,
-        gaze=np.clip([pose.gaze_x, pose.gaze_z], -1, 1) * GAZE_REACH,
+        gaze=gaze * GAZE_REACH,
+        eyes=(np.clip(gaze + each, -1, 1) - gaze) * GAZE_REACH,
+        lips=np.clip([getattr(pose, name) for name in LIPS], -1, 1),
+        seal=float(np.clip(pose.lips_together, 0, 1)),
+        cheeks=float(np.clip(pose.cheek_puff, -1, 1)),
     )

@@ -23,7 +23,7 @@ def diagnose(model: Model, pose, positions, planes, energy, residual) -> dict:
     for lids in model.lids:
         column = lids.contact_column
         gap = np.linalg.norm(positions[column] - lids.eye.centre, axis=1)
-        gap -= eyeball_radius(lids, positions[column], pose.gaze) + np.minimum(lids.clearance, 0)
+        gap -= eyeball_radius(lids, positions[column], pose.gaze["lr".index(lids.side)]) + np.minimum(lids.clearance, 0)
         eye = max(eye, -float(gap.min(initial=0.0)))
     return {
         "residual": float(residual),

@@ -14,7 +14,9 @@ from scipy import sparse
 from . import arch, contact
 from .jaw import jaw_transform
 from .lids import lid_targets
+from .muscle_field import turned_lips
 from .planes import Planes, contact_energy, joined
+from .seal import seal_energy
 from .springs import spring_energy
 from .structures import Control, Model
 from .volume import corner_gather, volume_energy
@@ -25,7 +27,8 @@ class Pose:
     """What a control means for a model: everything that does not change while solving.
 
     reference (3 n, 3): posed rest; rotation, translation of the mandible; pull (e, 3), push (e,), reach (e,), node (e,)
-    of the active muscle entries; lid_node (v,), lid_goal (v, 3), lid_stiffness (v,); gaze.
+    of the active muscle entries and of the air in the mouth; lid_node (v,), lid_goal (v, 3), lid_stiffness (v,);
+    gaze (2, 2) of left and right eye; seal 0..1 of the lips.
     """
 
     reference: np.ndarray
@@ -39,6 +42,7 @@ class Pose:
     lid_goal: np.ndarray
     lid_stiffness: np.ndarray
     gaze: np.ndarray
+    seal: float
 
 
 def posed_reference(model: Model, rotation, translation) -> np.ndarray:
@@ -61,9 +65,14 @@ def pose_of(model: Model, control: Control) -> Pose:
     direction = m.direction[on]
     turned = direction @ rotation.T
     direction = direction + m.tie[on, None] * (turned - direction)
+    if np.any(control.lips):
+        direction = turned_lips(m, on, direction, control.lips)
+    air = model.pressure
+    puff = float(np.clip(control.cheeks, -1, 1))
+    blown = len(air.column) if puff else 0
     lid_node, lid_goal, lid_stiffness = [], [], []
     for lids, closure in zip(model.lids, _lids_of(model, control), strict=True):
-        goal = lid_targets(lids, closure[0], closure[1], control.gaze)
+        goal = lid_targets(lids, closure[0], closure[1], control.gaze_of(lids.side))
         # goals are offsets from the rest: the scan's own lids stay where they are
         rest = model.layers.nodes[lids.column]
         lid_node.append(lids.column)
@@ -74,14 +83,15 @@ def pose_of(model: Model, control: Control) -> Pose:
         reference=reference,
         rotation=rotation,
         translation=translation,
-        node=m.column[on] + n,
-        pull=direction,
-        push=push[on],
-        reach=m.reach[m.owner[on]],
+        node=np.concatenate([m.column[on], air.column[:blown]]) + n,
+        pull=np.concatenate([direction, np.sign(puff) * air.direction[:blown]]),
+        push=np.concatenate([push[on], abs(puff) * air.strength * air.weight[:blown]]),
+        reach=np.concatenate([m.reach[m.owner[on]], np.full(blown, air.reach)]),
         lid_node=np.concatenate(lid_node) if lid_node else np.zeros(0, int),
         lid_goal=np.concatenate(lid_goal) if lid_goal else none,
         lid_stiffness=model.parameters.lid * np.concatenate(lid_stiffness) if lid_stiffness else np.zeros(0),
-        gaze=np.asarray(control.gaze, float),
+        gaze=np.array([control.gaze_of(side) for side in "lr"]),
+        seal=float(np.clip(control.seal, 0, 1)),
     )
 
 
@@ -161,6 +171,11 @@ def energy_gradient(model: Model, pose: Pose, planes: Planes, positions) -> tupl
         force = (pose.push * left)[:, None] * pose.pull
         for axis in range(3):
             gradient[:, axis] -= np.bincount(pose.node, force[:, axis], minlength=len(gradient))
+    if pose.seal:
+        e, force = seal_energy(model.seal, pose.seal * model.parameters.seal, positions)
+        energy += e
+        np.add.at(gradient, model.seal.lower, force)
+        np.subtract.at(gradient, model.seal.upper, force)
     if len(pose.lid_node):
         off = positions[pose.lid_node] - pose.lid_goal
         pulled = pose.lid_stiffness[:, None] * off
@@ -178,7 +193,7 @@ def find_contacts(model: Model, pose: Pose, positions) -> Planes:
     rest = model.layers.nodes[:n]
     return joined(
         contact.bone_planes(model.contacts.bones, model.layers, positions[n : 2 * n], pose.rotation, pose.translation),
-        *(contact.eye_planes(lids, positions[:n], pose.gaze) for lids in model.lids),
+        *(contact.eye_planes(lids, positions[:n], pose.gaze["lr".index(lids.side)]) for lids in model.lids),
         arch.arch_contacts(model.contacts, positions[:n], pose.rotation, pose.translation),
         contact.sheet_contacts(model.contacts, positions[:n]),
         contact.lip_contacts(model.contacts, positions[:n], rest),

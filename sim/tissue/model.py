@@ -15,6 +15,8 @@ from .layers import build_layers, sheet_ties
 from .lids import build_lids
 from .muscle_field import build_muscle_field
 from .parameters import DEFAULT, Parameters
+from .pressure import build_pressure
+from .seal import build_seal
 from .springs import build_springs
 from .structures import Control, Layers, Model, MuscleField, Solution, Springs, State
 from .volume import prism_volumes
@@ -55,6 +57,8 @@ def build_model(head: Head, parameters: Parameters = DEFAULT, table: dict | None
         prism_volume=volume[kept],
         bending=laplacian,
         muscles=build_muscle_field(head, layers, table),
+        seal=build_seal(head, layers),
+        pressure=build_pressure(head, layers, parameters),
         lids=tuple(x for x in (build_lids(head, layers, side) for side in "lr") if x is not None),
         contacts=build_surfaces(head, layers, ties),
         jaw=head.jaw,

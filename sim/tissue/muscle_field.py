@@ -18,6 +18,9 @@ from .structures import Layers, MuscleField
 JAW_MUSCLES = ("masseter", "temporalis", "pterygoideus_medialis", "pterygoideus_lateralis", "digastricus")
 #: Muscles whose work `lids` does as a turn of the lid over the eyeball.
 LID_MUSCLES = ("levator_palpebrae", "orbicularis_oculi_palpebral", "orbicularis_oculi_lacrimal")
+#: The two muscles that the orbicularis oris is divided into, each with a centre of contraction that moves on a line.
+LIPS = ("orbicularis_oris_upper", "orbicularis_oris_lower")
+FORWARD = np.array([[0.0, -1.0, 0.0]])
 _LIDS = ("upper_l", "upper_r", "lower_l", "lower_r")
 #: Half the width over which a single fibre takes hold of the fascia, mm: about one mesh of the skin and a half.
 _NARROWEST = 7.5
@@ -126,7 +129,7 @@ def build_muscle_field(head: Head, layers: Layers, table: dict) -> MuscleField:
     lid = np.max([np.asarray(head.groups.get(f"lid_{k}", np.zeros(n))) for k in _LIDS], axis=0)
     socket = np.asarray(head.groups.get("inner", np.zeros(n))) - np.asarray(head.groups.get("mouth_bag", np.zeros(n)))
     spare = (np.clip(1 - lid, 0, 1) ** 2 * (socket < 0.5))[usable]
-    owner, column, weight, direction, tie = [], [], [], [], []
+    owner, column, weight, direction, tie, lip, forward = [], [], [], [], [], [], []
     reach, excursion = [], []
     for k, muscle in enumerate(head.muscles):
         base = base_name(muscle.name)
@@ -158,6 +161,8 @@ def build_muscle_field(head: Head, layers: Layers, table: dict) -> MuscleField:
         weight.append(w[keep] * layers.area[usable[keep]])
         direction.append(unit[keep])
         tie.append(np.full(int(keep.sum()), 1.0 if muscle.origin == "mandible" else 0.0))
+        lip.append(np.full(int(keep.sum()), LIPS.index(base) if base in LIPS else -1))
+        forward.append(-np.minimum(unit[keep, 1:2], 0) * FORWARD * (base in LIPS))
     joined = [np.concatenate(x) if x else np.zeros(0, int) for x in (owner, column, weight, direction, tie)]
     return MuscleField(
         tuple(m.name for m in head.muscles),
@@ -165,4 +170,19 @@ def build_muscle_field(head: Head, layers: Layers, table: dict) -> MuscleField:
         strength=np.zeros(len(head.muscles)),
         reach=np.array(reach, float),
         excursion=np.array(excursion, float),
+        lip=np.concatenate(lip) if lip else np.zeros(0, int),
+        forward=np.concatenate(forward) if forward else np.zeros((0, 3)),
     )
+
+
+def turned_lips(field: MuscleField, entries, direction, lips) -> np.ndarray:
+    """``direction`` (e, 3) of ``entries`` (e,) with the centres of contraction of both lips moved to ``lips`` (2,).
+
+    "The center of contraction for each of these can be translated along a line" (Kähler et al. 2002, section 3): the
+    fibres pull towards it, and so push the lip out, or draw it against the teeth.
+    """
+    lip = field.lip[entries]
+    moved = np.append(np.asarray(lips, float), 0.0)[lip]
+    moved = np.where(moved < 0, 2 * moved, moved)  # behind the lip by as much as it lies in front of it at 0
+    turned = direction + moved[:, None] * field.forward[entries]
+    return turned / np.maximum(np.linalg.norm(turned, axis=1, keepdims=True), 1e-9)

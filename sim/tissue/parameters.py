@@ -34,6 +34,11 @@ class Parameters:
     #: contact penalties, in multiples of the epidermal stiffness.
     contact: float = 10.0
     lid: float = 1500.0
+    #: lips held together, per mm² of lip.
+    seal: float = 20.0
+    #: force of full pressure in the mouth, per mm² of cheek, and the mm of motion at which it is spent.
+    puff: float = 6.0
+    puff_reach: float = 18.0
     #: grams per mm² of skin: 5 mm of tissue at about 1 g/cm³.
     mass_area: float = 0.005
     #: per second; near critical for the slowest modes.

@@ -13,14 +13,14 @@ from .structures import Control, Model, State
 def posed_parts(model: Model, state: State, control: Control) -> dict[str, np.ndarray]:
     """Part -> (n, 3) mm: the skin as solved, mandible, lower teeth and tongue with the jaw, the eyes with the gaze."""
     rotation, translation = jaw_transform(model.jaw, *control.jaw)
-    turn = gaze_rotation(control.gaze)
     out = {"skin": state.skin.copy()}
     for part, vertices in model.rigid.items():
         if part in JAW_PARTS:
             out[part] = vertices @ rotation.T + translation
         elif part.startswith("eye_"):
-            centre = model.eyes[0 if part.endswith("_l") else 1].centre
-            out[part] = turned_eye(vertices, centre, turn)
+            side = part[-1]
+            centre = model.eyes["lr".index(side)].centre
+            out[part] = turned_eye(vertices, centre, gaze_rotation(control.gaze_of(side)))
         else:
             out[part] = vertices.copy()
     return out

@@ -62,6 +62,9 @@ class MuscleField:
     tie : share by which the direction turns with the mandible (muscles that arise from it)
     strength, reach : (k,) force per mm² at activation 1 and the shortening in mm at which the muscle is spent
     excursion : (k,) mm of skin motion expected at activation 1
+    lip : (e,) 0 for entries of the upper lip's orbicularis oris, 1 of the lower lip's, -1 of other muscles
+    forward : (e, 3) by which such an entry's direction changes as its centre of contraction moves forward (Kähler et al.
+        2002, section 3); zeros for other muscles
     """
 
     names: tuple[str, ...]
@@ -73,6 +76,22 @@ class MuscleField:
     strength: np.ndarray
     reach: np.ndarray
     excursion: np.ndarray
+    lip: np.ndarray
+    forward: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Pressure:
+    """Air in the mouth: entry e pushes fascia ``column[e]`` along ``direction[e]`` (e, 3), out of the mouth.
+
+    weight (e,) mm² of skin it acts on; strength: force per mm² at a puff of 1; reach: mm of motion at which it is spent
+    """
+
+    column: np.ndarray
+    direction: np.ndarray
+    weight: np.ndarray
+    strength: float
+    reach: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,6 +146,8 @@ class Model:
     prism_volume: np.ndarray  # (t,) mm³ at rest
     bending: Any  # sparse (n, n): Laplacian of a field on the skin, mm^-1 after area weighting
     muscles: MuscleField
+    pressure: Pressure
+    seal: Any  # seal.Seal
     lids: tuple[Lids, ...]
     contacts: Any  # contact.Surfaces
     jaw: Jaw
@@ -168,13 +189,26 @@ class Control:
     activations : (k,) 0..1 in the order of `Model.muscle_names`
     jaw : (3,) open 0..1, forward 0..1 (negative: back), side -1..1 (positive: to the subject's left)
     lids : (2, 2) left and right eye; upper and lower: 0 at rest, 1 closed, negative: opened wider
-    gaze : (2,) rad, to the subject's left and up
+    gaze : (2,) rad, of both eyes to the subject's left and up
+    eyes : (2, 2) rad, what the left and the right eye turn besides
+    lips : (2,) -1..1, upper and lower: where the centre of contraction of that lip's orbicularis oris lies, from behind
+        (the lip is drawn against the teeth) to in front (it is pushed out more than at 0)
+    seal : 0..1, how firmly the lips are held together where they touch at rest
+    cheeks : -1..1, pressure of the air in the mouth: 1 puffed, -1 sucked in
     """
 
     activations: np.ndarray
     jaw: np.ndarray
     lids: np.ndarray
     gaze: np.ndarray
+    lips: np.ndarray = field(default_factory=lambda: np.zeros(2))
+    cheeks: float = 0.0
+    seal: float = 0.0
+    eyes: np.ndarray = field(default_factory=lambda: np.zeros((2, 2)))
+
+    def gaze_of(self, side: str) -> np.ndarray:
+        """(2,) rad to the subject's left and up, of the eye on ``side`` ("l" or "r")."""
+        return np.asarray(self.gaze, float) + self.eyes["lr".index(side)]
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,31 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The ARKit blendshapes as poses, from the table ``assets/tables/arkit.json``."""
+
+import json
+from pathlib import Path
+
+from .pose import Pose, pose_from
+
+TABLE = Path(__file__).resolve().parents[2] / "assets" / "tables" / "arkit.json"
+#: Controls whose sign turns over in the mirror.
+_SIDEWAYS = ("jaw_side", "gaze_x", "gaze_l_x", "gaze_r_x")
+
+
+def poses(path=TABLE) -> dict[str, Pose]:
+    """ARKit's name, exactly as Apple spells it -> Pose."""
+    out = {}
+    for name, channels in json.loads(Path(path).read_text(encoding="utf-8"))["shapes"].items():
+        out[name] = pose_from(channels)
+        if name.endswith("Left"):
+            out[name.removesuffix("Left") + "Right"] = pose_from(mirrored(channels))
+    return out
+
+
+def mirrored(channels: dict[str, float]) -> dict[str, float]:
+    """Channels of the mirror image."""
+    other = {"l": "r", "r": "l"}
+    out = {}
+    for name, value in channels.items():
+        parts = [other.get(part, part) for part in name.split("_")]
+        out["_".join(parts)] = -value if name in _SIDEWAYS else value
+    return out
