@@ -3,18 +3,18 @@
 
 import bpy
 
-from ..sim.acting import expressions
+from ..sim.acting import arkit, expressions
 from ..sim.acting.models import DEFAULT
 from ..sim.errors import InputError
 from ..sim.progress import Work, portion
 from . import heads, performance, shape_keys
 from .provenance import timed, versions
 
-SETS = ("expressions", "muscles")
+SETS = ("expressions", "muscles", "arkit")
 
 
-def poses_of_set(skin: bpy.types.Object, name: str) -> dict:
-    """Pose name -> Pose of the set ``expressions`` or ``muscles``.
+def poses_of_set(skin: bpy.types.Object, name: str) -> tuple[dict, dict]:
+    """Name -> Pose of a set of `SETS`, and name -> name of the pose on top of which a shape plays, for those that do.
 
     Raises
     ------
@@ -23,10 +23,11 @@ def poses_of_set(skin: bpy.types.Object, name: str) -> dict:
     if name in SETS:
         head = heads.read_head(skin)
         if name == "muscles":
-            return expressions.muscle_poses(head)
+            return expressions.muscle_poses(head), {}
         names = [muscle.name for muscle in head.muscles]
-        return {key: expressions.for_head(pose, names) for key, pose in expressions.expressions().items()}
-    raise InputError(f"The set {name} is not in this version: bake --set muscles or --set expressions.")
+        poses, over = (arkit.poses(), arkit.over()) if name == "arkit" else (expressions.expressions(), {})
+        return {key: expressions.for_head(pose, names) for key, pose in poses.items()}, over
+    raise InputError(f"The set {name} is not in this version: bake --set {', '.join(SETS)}.")
 
 
 def bake(skin: bpy.types.Object, pose_set: str | None = None, acted=None, model: str = DEFAULT) -> Work:
@@ -40,7 +41,8 @@ def bake(skin: bpy.types.Object, pose_set: str | None = None, acted=None, model:
     shapes = acting = None
     if pose_set is not None:
         with timed(seconds, f"bake_{pose_set}"):
-            shapes = yield from portion(shape_keys.bake_poses(skin, poses_of_set(skin, pose_set), model), 0.0, border)
+            poses, over = poses_of_set(skin, pose_set)
+            shapes = yield from portion(shape_keys.bake_poses(skin, poses, model, over), 0.0, border)
     if acted is not None:
         with timed(seconds, "bake_performance"):
             acting = yield from portion(bake_acted(skin, acted, model=model), 0.0 if pose_set is None else border, 1.0)

@@ -72,9 +72,11 @@ def bake(options) -> None:
     """Poses or a performance to shape keys."""
     _require_head_file(options.head)
     if options.poses is None and options.performance is None:
-        raise InputError("There is nothing to bake: give --set muscles, --set expressions or --performance FILE.")
-    if options.poses in ("facs", "arkit"):
-        raise InputError(f"The set {options.poses} is not in this version: bake --set muscles or --set expressions.")
+        raise InputError(
+            "There is nothing to bake: give --set muscles, --set expressions, --set arkit or --performance FILE."
+        )
+    if options.poses == "facs":
+        raise InputError(f"The set {options.poses} is not in this version: bake --set muscles, expressions or arkit.")
     output = options.output or options.head
     _require_kind(output, _BLEND)
     performance = None

@@ -36,8 +36,9 @@ CONTROLS = {
     "gaze_r_z": ("Right Eye Up", -1.0, "Right eye turned up, besides both"),
     "lip_upper_forward": ("Upper Lip Forward", -1.0, "Where the sphincter of the upper lip pulls it when contracted"),
     "lip_lower_forward": ("Lower Lip Forward", -1.0, "Where the sphincter of the lower lip pulls it when contracted"),
-    "cheek_puff": ("Puff Cheeks", -1.0, "Pressure of the air in the mouth; negative sucks the cheeks in"),
     "lips_together": ("Lips Together", 0.0, "Lips held together where they touch, also over an open jaw"),
+    "cheek_puff": ("Puff Cheeks", -1.0, "Pressure of the air in the mouth; negative sucks the cheeks in"),
+    "tongue_out": ("Tongue Out", 0.0, "Tongue put out between the teeth: open the jaw a little for it"),
 }
 
 

@@ -12,7 +12,7 @@ import bpy
 import numpy as np
 
 from ..sim.acting.models import DEFAULT, model_named
-from ..sim.acting.pose import Pose, control
+from ..sim.acting.pose import Pose, combined, control
 from ..sim.errors import InputError
 from ..sim.mesh_subdivision import drawn
 from ..sim.progress import Progress, Work
@@ -25,13 +25,14 @@ ITERATIONS = 200  # until it rests, not until it looks right
 STILL = 0.001  # mm: a part that moves less gets no key
 
 
-def bake_poses(skin: bpy.types.Object, poses: dict[str, Pose], model: str = DEFAULT) -> Work:
+def bake_poses(skin: bpy.types.Object, poses: dict[str, Pose], model: str = DEFAULT, over=None) -> Work:
     """Simulate each pose until it rests and store it as a shape key; returns name -> report.
 
     A report holds ``model``, ``peak_mm`` (of the surface drawn), ``volume_drift``, ``penetration_mm`` and ``converged``.
     Nothing is written before all poses are simulated: closing the generator leaves the head as it was.
 
     model : name of the model that acts (`sim.acting.models`)
+    over : name -> name of the pose on top of which that shape is meant to play: its key holds the difference to it
 
     Raises
     ------
@@ -48,15 +49,23 @@ def bake_poses(skin: bpy.types.Object, poses: dict[str, Pose], model: str = DEFA
     shapes, report = {}, {}
     for number, (name, pose) in enumerate(poses.items()):
         yield Progress(0.1 + 0.9 * number / len(poses), f"Simulating {name}")
-        asked = control(built, pose)
-        # from rest: a key must not depend on its neighbours
-        solution = acting.solve(built, asked, max_iterations=ITERATIONS)
-        posed = posed_parts(built, solution.state, asked)
-        shapes[name] = {part: posed[part] - neutral[part] for part in posed}
+        start = neutral
+        if over and name in over:
+            start = posed_by(acting, built, poses[over[name]])[1]
+            pose = combined(pose, poses[over[name]])
+        solution, posed = posed_by(acting, built, pose)
+        shapes[name] = {part: posed[part] - start[part] for part in posed}
         report[name] = {"model": model} | _report(solution, drawn(head.skin.faces, shapes[name]["skin"]))
     yield Progress(1.0, "Writing shape keys")
     write_shapes(skin, shapes, report)
     return report
+
+
+def posed_by(acting, built, pose: Pose):
+    """The solution of a pose, and all parts in it. From rest: a key must not depend on its neighbours."""
+    asked = control(built, pose)
+    solution = acting.solve(built, asked, max_iterations=ITERATIONS)
+    return solution, posed_parts(built, solution.state, asked)
 
 
 def _report(solution, delta: np.ndarray) -> dict:

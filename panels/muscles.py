@@ -62,7 +62,7 @@ class HEADSHOP_PT_controls(_Sliders, bpy.types.Panel):
             row.prop(group, f"gaze_{side}_x", text=f"Eye {label} Side")
             row.prop(group, f"gaze_{side}_z", text=f"Eye {label} Up")
         column = self.layout.column(align=True)
-        for name in ("lip_upper_forward", "lip_lower_forward", "lips_together", "cheek_puff"):
+        for name in ("lip_upper_forward", "lip_lower_forward", "lips_together", "cheek_puff", "tongue_out"):
             column.prop(group, name)
 
 

@@ -159,7 +159,7 @@ def test_an_output_that_cannot_be_written(capfd, tmp_path, scan, landmarks, outp
     )
 
 
-@pytest.mark.parametrize("name", ["facs", "arkit"])
+@pytest.mark.parametrize("name", ["facs"])
 def test_sets_to_come(capfd, tmp_path, name):
     head = tmp_path / "head.blend"
     head.write_bytes(b"anything")

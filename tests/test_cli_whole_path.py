@@ -103,7 +103,7 @@ def test_performance(bpy, built):
 
 def test_it_is_a_program(built):
     """The same as a process of its own: the sentence of a wrong request, and silence where there is nothing to say."""
-    command = [sys.executable, "-m", "headshop", "bake", str(built / "head.blend"), "--set", "arkit"]
+    command = [sys.executable, "-m", "headshop", "bake", str(built / "head.blend"), "--set", "facs"]
     done = subprocess.run(command, capture_output=True, text=True)
     assert (done.returncode, done.stdout) == (2, "") and done.stderr.count("\n") == 1
     command = [

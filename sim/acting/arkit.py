@@ -21,6 +21,11 @@ def poses(path=TABLE) -> dict[str, Pose]:
     return out
 
 
+def over(path=TABLE) -> dict[str, str]:
+    """Name of a shape that plays on top of another -> name of that other."""
+    return json.loads(Path(path).read_text(encoding="utf-8"))["over"]
+
+
 def mirrored(channels: dict[str, float]) -> dict[str, float]:
     """Channels of the mirror image."""
     other = {"l": "r", "r": "l"}

@@ -14,7 +14,7 @@ LIPS = ("lip_upper_forward", "lip_lower_forward")
 #: The controls that are not muscles.
 CONTROLS = (
     *("jaw_open", "jaw_forward", "jaw_side", "blink_l", "blink_r", "gaze_x", "gaze_z", *EYES),
-    *(*LIPS, "lips_together", "cheek_puff"),
+    *(*LIPS, "lips_together", "cheek_puff", "tongue_out"),
 )
 
 #: What gaze 1.0 means, rad (Ekman, Friesen and Hager 2002, AU 61 to 64: eyes to the side 35, up or down 25 degrees).
@@ -45,7 +45,8 @@ _SIDE_WORK = 0.6
 class Pose:
     """muscles: name -> 0..1; jaw_open 0..1, jaw_forward and jaw_side -1..1; blink 0..1; gaze -1..1 (left, up), of both eyes
     and of each besides;    lips' sphincter centres -1..1 (back, forward); cheek_puff -1..1;
-    lips_together 0..1."""
+    lips_together and tongue_out
+    0..1."""
 
     muscles: dict[str, float] = field(default_factory=dict)
     jaw_open: float = 0.0
@@ -63,6 +64,7 @@ class Pose:
     lip_lower_forward: float = 0.0
     cheek_puff: float = 0.0
     lips_together: float = 0.0
+    tongue_out: float = 0.0
 
     def values(self) -> dict[str, float]:
         """Channel name -> value: every muscle named, and all of `CONTROLS`."""
@@ -73,6 +75,14 @@ def pose_from(values: dict[str, float]) -> Pose:
     """The pose with channels ``values`` (muscle and control names mixed)."""
     muscles = {k: float(v) for k, v in values.items() if k not in CONTROLS}
     return Pose(muscles, **{k: float(v) for k, v in values.items() if k in CONTROLS})
+
+
+def combined(one: Pose, other: Pose) -> Pose:
+    """Both poses at once: the sum of their channels."""
+    total = dict(one.values())
+    for name, value in other.values().items():
+        total[name] = total.get(name, 0.0) + value
+    return pose_from(total)
 
 
 def control(model: Model, pose: Pose) -> Control:
@@ -121,5 +131,6 @@ def control(model: Model, pose: Pose) -> Control:
         eyes=(np.clip(gaze + each, -1, 1) - gaze) * GAZE_REACH,
         lips=np.clip([getattr(pose, name) for name in LIPS], -1, 1),
         seal=float(np.clip(pose.lips_together, 0, 1)),
+        tongue=float(np.clip(pose.tongue_out, 0, 1)),
         cheeks=float(np.clip(pose.cheek_puff, -1, 1)),
     )

@@ -8,6 +8,7 @@ from ..anatomy.head import JAW_PARTS
 from .jaw import jaw_transform
 from .lids import gaze_rotation
 from .structures import Control, Model, State
+from .tongue import tongue_out
 
 
 def posed_parts(model: Model, state: State, control: Control) -> dict[str, np.ndarray]:
@@ -15,6 +16,8 @@ def posed_parts(model: Model, state: State, control: Control) -> dict[str, np.nd
     rotation, translation = jaw_transform(model.jaw, *control.jaw)
     out = {"skin": state.skin.copy()}
     for part, vertices in model.rigid.items():
+        if part == "tongue":
+            vertices = tongue_out(vertices, model.rigid.get("teeth_lower", vertices[:0]), control.tongue)
         if part in JAW_PARTS:
             out[part] = vertices @ rotation.T + translation
         elif part.startswith("eye_"):

@@ -190,6 +190,7 @@ class Control:
     jaw : (3,) open 0..1, forward 0..1 (negative: back), side -1..1 (positive: to the subject's left)
     lids : (2, 2) left and right eye; upper and lower: 0 at rest, 1 closed, negative: opened wider
     gaze : (2,) rad, of both eyes to the subject's left and up
+    tongue : 0..1, how far it is put out
     eyes : (2, 2) rad, what the left and the right eye turn besides
     lips : (2,) -1..1, upper and lower: where the centre of contraction of that lip's orbicularis oris lies, from behind
         (the lip is drawn against the teeth) to in front (it is pushed out more than at 0)
@@ -204,6 +205,7 @@ class Control:
     lips: np.ndarray = field(default_factory=lambda: np.zeros(2))
     cheeks: float = 0.0
     seal: float = 0.0
+    tongue: float = 0.0
     eyes: np.ndarray = field(default_factory=lambda: np.zeros((2, 2)))
 
     def gaze_of(self, side: str) -> np.ndarray:
