@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from headshop.sim.acting import arkit
-from headshop.sim.acting.pose import CONTROLS, Pose, combined, control
+from headshop.sim.acting.pose import Pose, combined, control
 from headshop.sim.mesh import vertex_normals
 from headshop.sim.tissue.model import build_model
 from headshop.sim.tissue.posing import posed_parts
