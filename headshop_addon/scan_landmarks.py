@@ -99,6 +99,11 @@ def found(scan) -> tuple[dict[str, np.ndarray], dict[str, float]]:
     return {i.name: np.array(i.found, dtype=float) / METRES for i in items}, {i.name: i.confidence for i in items}
 
 
+def in_mid_air(scan) -> set[str]:
+    """Found landmarks, not placed by hand, that lie where the scan shows nothing."""
+    return {i.name for i in scan.headshop.landmarks if i.state == "FOUND" and i.mid_air}
+
+
 def to_build(scan) -> dict[str, np.ndarray]:
     """Landmark -> (3,) mm of those that a head is built from: the placed, and the found ones that are sure enough."""
     from ..sim.landmarks.sure import SURE
@@ -133,11 +138,15 @@ def _on_a_line(given: dict) -> bool:
 
 
 def most_useful(scan) -> list[str]:
-    """Found landmarks that were not corrected, the one first whose correction helps most."""
+    """Found landmarks that were not corrected, the one first whose correction helps most.
+
+    Those in mid-air come last: there is nothing to click.
+    """
     from ..sim.landmarks.correction import most_useful as ranked
 
     positions_found, confidence = found(scan)
-    return ranked(positions_found, confidence, positions(scan)) if positions_found else []
+    names = ranked(positions_found, confidence, positions(scan)) if positions_found else []
+    return sorted(names, key=in_mid_air(scan).__contains__)
 
 
 def snapshot(scan) -> tuple:

@@ -26,7 +26,7 @@ class HEADSHOP_OT_build_head(Job, bpy.types.Operator):
             return False
         missing = scan_landmarks.ENOUGH_TO_BUILD - len(scan_landmarks.to_build(active.scan(context)))
         if missing > 0:
-            cls.poll_message_set(f"Place {missing} more landmark{'s' if missing > 1 else ''} on the scan first")
+            cls.poll_message_set(f"Find the landmarks of the scan first, or click {missing} more")
             return False
         return True
 

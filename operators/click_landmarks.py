@@ -22,6 +22,13 @@ class HEADSHOP_OT_click_landmarks(bpy.types.Operator):
     start: bpy.props.StringProperty(name="Landmark", description="Ask for this landmark only", options={"SKIP_SAVE"})
 
     @classmethod
+    def description(cls, context, properties):
+        """Another tooltip where one landmark is asked for."""
+        if properties.start:
+            return f"Click where this landmark lies: {label(properties.start)}. Found and estimated ones follow"
+        return cls.__doc__
+
+    @classmethod
     def poll(cls, context):
         """Needs a scan and the warp."""
         if active.scan(context) is None:

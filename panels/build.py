@@ -28,7 +28,7 @@ class HEADSHOP_PT_build(SidebarPanel, bpy.types.Panel):
         if scan is None and skin is None:
             hint(layout, context, "A head is built from a scan with landmarks.")
         elif skin is None and len(scan_landmarks.to_build(scan)) < scan_landmarks.ENOUGH_TO_BUILD:
-            hint(layout, context, "Place at least four landmarks on the scan first.")
+            hint(layout, context, "Find the landmarks of the scan first, or click at least four.")
         elif skin is None:
             hint(layout, context, "Ready: this takes some seconds.", "CHECKMARK")
         if skin is not None:

@@ -14,8 +14,9 @@ class HEADSHOP_UL_landmarks(bpy.types.UIList):
     """Landmarks with their state."""
 
     def draw_item(self, context, layout, data, item, icon, active_data, active_property, index):
-        """State, short name, long name."""
+        """State, short name, long name; grey where it hangs in mid-air."""
         split = layout.split(factor=0.3)
+        split.active = not (item.state == "FOUND" and item.mid_air)
         split.label(text=item.name, icon=_ICONS[item.state])
         split.label(text=LABELS[item.name.partition("_")[0]].partition(",")[0].capitalize())
 
@@ -28,7 +29,8 @@ class HEADSHOP_PT_landmarks(SidebarPanel, bpy.types.Panel):
     def draw(self, context):
         """Click, load, save; then the list."""
         layout, settings = self.layout, context.scene.headshop
-        progress(layout, "landmarks")
+        if progress(layout, "landmarks"):
+            return
         scan = active.scan(context)
         if scan is None:
             hint(layout, context, "Landmarks are placed on a scan: import one first.")
@@ -44,34 +46,39 @@ class HEADSHOP_PT_landmarks(SidebarPanel, bpy.types.Panel):
         row.operator("headshop.load_landmarks", text="Load", icon="FILE_FOLDER")
         row.operator("headshop.save_landmarks", text="Save", icon="FILE_TICK")
         row.operator("headshop.clear_landmarks", text="Clear", icon="TRASH")
-        estimated = len(scan_landmarks.positions(scan, "DERIVED"))
         found = len(scan_landmarks.positions(scan, "FOUND"))
         if found:
-            text = f"{found} found, {placed} placed"
-            layout.label(text=text + (f", {estimated} estimated" if estimated else ""), icon="CHECKMARK")
-            self._advise(layout, scan)
+            hint(layout, context, _counted(scan), "CHECKMARK")
+            _advise(layout, context, scan)
         elif placed == 0:
-            hint(
-                layout,
-                context,
-                "Find the landmarks, or click the points you are asked for; four are enough.",
-            )
+            hint(layout, context, "Find the landmarks, or click the points you are asked for; four are enough.")
         elif placed < scan_landmarks.ENOUGH_TO_BUILD:
             wanted = scan_landmarks.ENOUGH_TO_BUILD - placed
             hint(layout, context, f"{placed} placed, {wanted} more needed to build a head.")
         else:
-            text = f"{placed} placed" + (f", {estimated} estimated" if estimated else "")
-            layout.label(text=text, icon="CHECKMARK")
+            hint(layout, context, _counted(scan), "CHECKMARK")
         row = layout.row(align=True)
         row.prop(settings, "show_landmarks", text="Show", toggle=True)
         row.prop(settings, "show_names", toggle=True)
 
-    def _advise(self, layout, scan):
-        """Name the landmark whose correction helps most."""
-        name = next(iter(scan_landmarks.most_useful(scan)), None)
-        if name is not None:
-            text = f"Correct {name}: {label(name).partition(',')[0]}"
-            layout.operator("headshop.click_landmarks", text=text, icon="RESTRICT_SELECT_OFF").start = name
+
+def _advise(layout, context, scan):
+    """Name the landmark whose correction helps most."""
+    name = next(iter(scan_landmarks.most_useful(scan)), None)
+    if name is not None:
+        layout.operator("headshop.click_landmarks", text=f"Correct {name}", icon="RESTRICT_SELECT_OFF").start = name
+        hint(layout, context, f"It helps most: {label(name)}.", "BLANK1")
+
+
+def _counted(scan) -> str:
+    """How many landmarks there are of each state; found ones in mid-air count by themselves."""
+    counts = {
+        "found": len(scan_landmarks.positions(scan, "FOUND")) - len(scan_landmarks.in_mid_air(scan)),
+        "in mid-air": len(scan_landmarks.in_mid_air(scan)),
+        "placed": len(scan_landmarks.positions(scan)),
+        "estimated": len(scan_landmarks.positions(scan, "DERIVED")),
+    }
+    return ", ".join(f"{count} {state}" for state, count in counts.items() if count)
 
 
 class HEADSHOP_PT_landmark_list(SidebarPanel, bpy.types.Panel):

@@ -119,6 +119,29 @@ def test_landmarks_are_counted_until_a_head_can_be_built(addon, scan, reference)
     assert "Place v" in _text(draw_all(addon), "landmark_list")
 
 
+def test_found_landmarks_are_told_from_those_in_mid_air_and_the_next_to_correct_is_named(addon, scan, reference):
+    from headshop.headshop_addon import jobs, scan_landmarks
+    from headshop.sim.anatomy.landmark_names import SKIN
+    from headshop.sim.landmarks.find import FoundLandmarks
+
+    truth = {n: p for n, p in reference.landmark_positions().items() if n in SKIN}
+    confidence = dict.fromkeys(truth, 0.9) | {"zy_r": 0.2, "op": 0.1, "v": 0.1}
+    scan_landmarks.take_found(scan, FoundLandmarks(truth, confidence, ("op", "v"), ()))
+    drawn = draw_all(addon)
+    text = _text(drawn, "landmarks")
+    assert "58 found, 2 in mid-air" in text and "placed" not in text and "Ready" in _text(drawn, "build")
+    assert "Correct zy_r" in text and "subject's right" in text
+    scan_landmarks.put(scan, "zy_r", truth["zy_r"])
+    scan_landmarks.follow(scan)
+    text = _text(draw_all(addon), "landmarks")
+    assert "57 found, 2 in mid-air, 1 placed" in text and "Correct zy_r" not in text
+    jobs.running = jobs.Running("Find Landmarks", "landmarks", 0.1, "Looking")
+    try:
+        assert "Correct" not in _text(draw_all(addon), "landmarks"), "nothing to press while it looks"
+    finally:
+        jobs.running = None
+
+
 def test_how_the_file_was_read_is_shown_and_doubt_is_said(addon, scan):
     import json
 

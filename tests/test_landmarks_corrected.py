@@ -52,6 +52,9 @@ def test_found_landmarks_live_on_the_scan_apart_from_placed_ones(addon, referenc
     assert "op" not in scan_landmarks.to_build(scan) and len(scan_landmarks.to_build(scan)) == 59
     asked = scan_landmarks.next_to_place(scan)
     assert asked == scan_landmarks.most_useful(scan)[0] != "prn"
+    assert scan_landmarks.in_mid_air(scan) == {"op"}
+    assert scan_landmarks.most_useful(scan)[-1] == "op", "there is nothing to click"
+    assert most_useful(found.positions, found.confidence)[-1] != "op"
     before = scan_landmarks.positions(scan, "FOUND")["cph_l"]
     scan_landmarks.put(scan, "ls", found.positions["ls"] + [0, 0, -5.0])
     scan_landmarks.follow(scan)

@@ -107,6 +107,27 @@ def test_the_scans_colours_arrive_and_spread_where_it_has_none(reference):
     assert 0.05 < colour[nearest["op"]].min() and colour[nearest["op"]].max() < 0.45
 
 
+def test_a_speck_beside_the_skin_leaves_no_spot(reference):
+    pytest.importorskip("bpy")
+    from headshop.headshop_addon.scan_colour import ScanColour
+    from headshop.sim.mesh import Mesh, vertex_normals
+
+    scan, place = _coloured_scan(reference), reference.landmark_positions()["zy_l"]
+    nearest = np.argmin(((scan.vertices - place) ** 2).sum(axis=1))
+    normal = vertex_normals(scan.vertices, scan.triangles)[nearest]
+    side = np.cross(normal, [0, 0, 1.0])
+    asked = scan.vertices[nearest] + 2 * normal
+    speck = asked + np.array([np.zeros(3), side, np.cross(normal, side)])
+    dirty = Mesh.from_triangles(
+        np.concatenate([scan.vertices, speck]),
+        np.concatenate([scan.triangles, [len(scan.vertices) + np.arange(3)]]),
+        colour=np.concatenate([scan.colour, np.zeros((3, 3), np.float32)]),
+    )
+    clean, found = (ScanColour(mesh).at(asked[None], normal[None])[0] for mesh in (scan, dirty))
+    np.testing.assert_allclose(found, clean, atol=1e-6)
+    assert clean[0, 0] > 0.3
+
+
 def test_a_scan_elsewhere_gives_no_colour(reference):
     pytest.importorskip("bpy")
     from headshop.headshop_addon.scan_colour import ScanColour, vertex_colour

@@ -18,7 +18,7 @@ from ..scan.face_match import face_template, surface_samples
 from .confidence import judge, judge_together
 from .expression import fit_expression, meeting_lids
 from .picked import picked
-from .pose_search import search_poses
+from .pose_search import LOOKING, search_poses
 from .shape_fit import TRIAL, NoFaceError, fit_shape
 from .shape_space import shape_space
 from .sure import SURE
@@ -76,25 +76,23 @@ def find_landmarks(mesh: Mesh, reference: Head | None = None, unit_scales=(1.0,)
     ------
     InputError : there is no face in it.
     """
-    looking = "Looking for the face"
-    yield Progress(0.0, looking)
+    yield Progress(0.0, LOOKING)
     reference = reference or load_head()
     space = shape_space(reference)
     few = space.reduced(TRIAL_MODES)
+    yield Progress(0.05, LOOKING)
     template, samples = face_template(reference), surface_samples(mesh)
     trials = []
     for k, scale in enumerate(unit_scales):
-        done = k / len(unit_scales)
-        yield Progress(0.1 + 0.4 * done, looking)
-        poses = search_poses(samples * scale, template, TRIED)
-        yield Progress(0.1 + 0.4 * (done + 0.5 / len(unit_scales)), looking)
+        low, middle, high = (0.1 + 0.4 * (k + part) / len(unit_scales) for part in (0.0, 0.5, 1.0))
+        poses = yield from portion(search_poses(samples * scale, template, TRIED), low, middle)
+        yield Progress(middle, LOOKING)
         target = Surface(mesh.vertices * scale, mesh.triangles, smooth=NORMALS).coarser()
-        for pose in poses:
+        for number, pose in enumerate(poses):
             facing = _facing(few, target, pose)
+            part = (middle + (high - middle) * (number + extra) / len(poses) for extra in (0, 1))
             try:
-                fit = yield from _run(
-                    fit_shape(few, facing, pose, TRIAL, every=3), 0.1 + 0.4 * done + 0.3, 0.0, looking
-                )
+                fit = yield from _run(fit_shape(few, facing, pose, TRIAL, every=3), *part, LOOKING)
             except NoFaceError:
                 continue
             trials.append((_misfit(few, fit), scale, fit, facing))
@@ -159,4 +157,4 @@ def _run(work, start, stop, label):
             done = next(work)
         except StopIteration as end:
             return end.value
-        yield Progress(start + max(stop - start, 0.0) * done, label)
+        yield Progress(start + (stop - start) * done, label)

@@ -10,9 +10,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
+from ..progress import Progress, Work
 from ..scan.face_match import COARSE, FINE, align, in_order, starts_of, thinned
 from ..scan.orientation import rotations
 
+LOOKING = "Looking for the face"
 STARTS = 240
 FEW = 70  # points of the template in the first rounds
 SURVIVORS = 50  # starts that go on after the first rounds
@@ -48,8 +50,8 @@ def even_rotations(count: int) -> np.ndarray:
     )
 
 
-def search_poses(points: np.ndarray, template: np.ndarray, count: int = 5) -> list[Pose]:
-    """The ``count`` best placements of the face that differ by more than a little turn, best first.
+def search_poses(points: np.ndarray, template: np.ndarray, count: int = 5) -> Work:
+    """Work returning the ``count`` best placements of the face that differ by more than a little turn, best first.
 
     points (n, 3) mm : samples of the scan's surface, in any turn
     template (k, 3) mm : the reference's face, the tip of the nose first (`face_match.face_template`)
@@ -60,9 +62,12 @@ def search_poses(points: np.ndarray, template: np.ndarray, count: int = 5) -> li
     few = template[in_order(template, FEW)]
     turns = [*rotations(), *even_rotations(STARTS)]
     turn, shift, _ = starts_of(coarse, template, few, turns)
+    yield Progress(0.2, LOOKING)
     scale, turn, shift, misfit = align(tree, few, turn, shift, rounds=4)
+    yield Progress(0.6, LOOKING)
     best = np.argsort(misfit, kind="stable")[:SURVIVORS]
     scale, turn, shift, misfit = align(tree, few, turn[best], shift[best], 10, scale[best])
+    yield Progress(0.8, LOOKING)
     kept = _different(turn, misfit, 3 * count)
     scale, turn, shift, misfit = align(fine, template, turn[kept], shift[kept], 10, scale[kept])
     return [Pose(float(scale[k]), turn[k], shift[k], float(misfit[k])) for k in _different(turn, misfit, count)]
