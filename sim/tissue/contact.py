@@ -137,21 +137,22 @@ def eye_planes(lids, positions: np.ndarray, gaze: np.ndarray) -> Planes:
     return Planes(column[near], normal[near], level, np.full(int(near.sum()), -1))
 
 
-def sheet_contacts(surfaces: Surfaces, positions) -> Planes:
-    """Mouth bag and outer skin back to back: the outer one stays outside by a third of their gap at rest."""
+def sheet_contacts(surfaces: Surfaces, normals) -> Planes:
+    """Mouth bag and outer skin back to back: the outer one stays outside by a third of their gap at rest.
+
+    normals (n, 3) of the skin as it is now."""
     inner, outer = surfaces.sheets[:, 0], surfaces.sheets[:, 1]
-    normal = vertex_normals(positions, surfaces.triangles)[outer]
-    return Planes(outer, normal, 0.35 * surfaces.sheet_gap, inner)
+    return Planes(outer, normals[outer], 0.35 * surfaces.sheet_gap, inner)
 
 
-def lip_contacts(surfaces: Surfaces, positions, reference) -> Planes:
-    """Upper lip against lower lip, each lower vertex against the tangent plane of its nearest upper vertex."""
+def lip_contacts(surfaces: Surfaces, skin, normals, reference, rest_normals) -> Planes:
+    """Upper lip against lower lip, each vertex against the tangent plane of the nearest one of the other lip.
+
+    skin, normals (n, 3) as they are now; reference, rest_normals (n, 3) at rest
+    """
     upper, lower = surfaces.lip_upper, surfaces.lip_lower
     if len(upper) < 3 or len(lower) < 3:
         return empty_planes()
-    skin = positions[: len(reference)]
-    normals = vertex_normals(skin, surfaces.triangles)
-    rest_normals = vertex_normals(reference, surfaces.triangles)
     node, partner, normal, level = [], [], [], []
     for own, other in ((lower, upper), (upper, lower)):
         distance, near = cKDTree(skin[other]).query(skin[own])

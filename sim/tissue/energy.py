@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import sparse
 
+from ..mesh import vertex_normals
 from . import arch, contact
 from .jaw import jaw_transform
 from .lids import lid_targets
@@ -190,11 +191,15 @@ def energy_gradient(model: Model, pose: Pose, planes: Planes, positions) -> tupl
 def find_contacts(model: Model, pose: Pose, positions) -> Planes:
     """The planes that matter near ``positions`` (3 n, 3)."""
     n = model.count
-    rest = model.layers.nodes[:n]
+    skin, rest = positions[:n], model.layers.nodes[:n]
+    triangles = model.contacts.triangles
+    normals = vertex_normals(skin, triangles)
+    if "rest_normals" not in model.cache:
+        model.cache["rest_normals"] = vertex_normals(rest, triangles)
     return joined(
         contact.bone_planes(model.contacts.bones, model.layers, positions[n : 2 * n], pose.rotation, pose.translation),
-        *(contact.eye_planes(lids, positions[:n], pose.gaze["lr".index(lids.side)]) for lids in model.lids),
-        arch.arch_contacts(model.contacts, positions[:n], pose.rotation, pose.translation),
-        contact.sheet_contacts(model.contacts, positions[:n]),
-        contact.lip_contacts(model.contacts, positions[:n], rest),
+        *(contact.eye_planes(lids, skin, pose.gaze["lr".index(lids.side)]) for lids in model.lids),
+        arch.arch_contacts(model.contacts, skin, pose.rotation, pose.translation),
+        contact.sheet_contacts(model.contacts, normals),
+        contact.lip_contacts(model.contacts, skin, normals, rest, model.cache["rest_normals"]),
     )

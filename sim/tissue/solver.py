@@ -16,7 +16,7 @@ from .energy import energy_gradient, find_contacts, pose_of
 from .planes import Planes, project
 from .structures import Control, Model, Solution, State
 
-_MEMORY = 10
+MEMORY = 10
 #: Steps after which contacts are looked for again: ever more seldom, so that the last planes are solved to the end.
 _REFRESH = frozenset((4, 8, 13, 19, 27, 38, 53, 75, 105, 150))
 
@@ -35,16 +35,12 @@ def solve(
     tolerance : mm; the largest remaining quasi-Newton step at which the pose counts as settled.
     """
     pose = pose_of(model, control)
-    start = pose.reference.copy()
     if state is not None:
-        before = state.positions
-        start[: 2 * model.count] = before[: 2 * model.count]
-        start = _carry_jaw(model, state, pose, start)
-    start[~np.concatenate([model.layers.free, np.zeros(model.count, bool)])] = pose.reference[
-        ~np.concatenate([model.layers.free, np.zeros(model.count, bool)])
-    ]
-    if state is None and len(pose.lid_node):
-        start[pose.lid_node] = pose.lid_goal
+        start = _carried_along(model, state, pose)
+    else:
+        start = pose.reference.copy()
+        at = np.flatnonzero(model.layers.free[pose.lid_node])
+        start[pose.lid_node[at]] = pose.lid_goal[at]
     factor = factorised(model)
     positions, energy, residual, iterations, planes = _minimise(
         lambda x, planes: energy_gradient(model, pose, planes, x),
@@ -56,11 +52,23 @@ def solve(
         tolerance,
     )
     n = model.count
-    visible = _skin_planes(find_contacts(model, pose, positions), n)
+    visible = skin_planes(find_contacts(model, pose, positions), n)
     positions = project(visible, positions)
     result = State(positions, np.zeros_like(positions))
     report = diagnose(model, pose, positions, visible, energy, residual)
     return Solution(result, residual <= tolerance, residual, iterations, report)
+
+
+def _carried_along(model: Model, state: State, pose) -> np.ndarray:
+    """(3 n, 3) mm: the nodes of ``state`` as a start for ``pose``: moved along with the jaw, bone and what is not free in
+    its place."""
+    start = pose.reference.copy()
+    free = model.cache["matrix"]["free"]
+    start[: 2 * model.count] = state.positions[: 2 * model.count]
+    start = _carry_jaw(model, state, pose, start)
+    out = pose.reference.copy()
+    out[free] = start[free]
+    return out
 
 
 def _carry_jaw(model, state, pose, start):
@@ -92,7 +100,8 @@ def _reference_of(model, bones):
     return layers.nodes + w * (moved - layers.nodes)
 
 
-def _skin_planes(planes, n):
+def skin_planes(planes, n):
+    """Those of ``planes`` that keep skin from eyeballs, teeth and other skin."""
     keep = (planes.node < n) & (planes.partner < n)
     return Planes(planes.node[keep], planes.normal[keep], planes.level[keep], planes.partner[keep])
 
@@ -116,14 +125,29 @@ def factorised(model: Model, dt: float | None = None):
 
 def _minimise(value, contacts, factor, free, positions, max_iterations, tolerance):
     """Quasi-Newton descent; returns positions, energy, residual (mm), iterations and the last contact planes."""
-    planes = contacts(positions)
-    energy, gradient = value(positions, planes)
     pairs = []
-    residual, iterations = np.inf, 0
-    for iterations in range(1, max_iterations + 1):
-        if iterations - 1 in _REFRESH:
-            planes = contacts(positions)
-            energy, gradient = value(positions, planes)
+    residual, done, planes, energy = np.inf, 0, contacts(positions), 0.0
+    for until in (*sorted(k for k in _REFRESH if k < max_iterations), max_iterations):
+        at = planes
+        positions, energy, residual, steps = descend(
+            lambda x, at=at: value(x, at), factor, free, positions, pairs, until - done, tolerance
+        )
+        done += steps
+        if residual <= tolerance or done < until or until == max_iterations:
+            break
+        planes = contacts(positions)
+    return positions, energy, residual, done, planes
+
+
+def descend(value, factor, free, positions, pairs, steps, tolerance=0.0):
+    """At most ``steps`` quasi-Newton steps; returns positions, energy, residual (mm) and the number of steps.
+
+    value : positions (3 n, 3) -> energy and its gradient over the ``free`` nodes
+    pairs : what is known of the curvature; is added to
+    """
+    energy, gradient = value(positions)
+    residual = np.inf
+    for count in range(1, steps + 1):
         direction = -_two_loop(gradient, pairs, factor)
         slope = float(np.einsum("ij,ij->", direction, gradient))
         if slope >= 0:  # a stale memory: fall back to the matrix alone
@@ -132,12 +156,12 @@ def _minimise(value, contacts, factor, free, positions, max_iterations, toleranc
             slope = float(np.einsum("ij,ij->", direction, gradient))
         residual = float(np.sqrt((direction**2).sum(axis=1).max(initial=0.0)))
         if residual <= tolerance:
-            break
+            return positions, energy, residual, count
         length = min(1.0, 15.0 / residual)  # no node jumps farther than this in one step
         moved = positions.copy()
         for _ in range(12):
             moved[free] = positions[free] + length * direction
-            new_energy, new_gradient = value(moved, planes)
+            new_energy, new_gradient = value(moved)
             if new_energy <= energy + 1e-4 * length * slope:
                 break
             # the minimum of the parabola through both energies and the slope
@@ -145,29 +169,29 @@ def _minimise(value, contacts, factor, free, positions, max_iterations, toleranc
             length *= float(np.clip(-0.5 * length * slope / max(curve, 1e-30), 0.1, 0.6))
         else:
             if not pairs:
-                break
+                return positions, energy, residual, count
             pairs.clear()
             continue
-        s, y = length * direction, new_gradient - gradient
-        curvature = float(np.einsum("ij,ij->", s, y))
+        s, y = (length * direction).ravel(), (new_gradient - gradient).ravel()
+        curvature = float(s @ y)
         if curvature > 1e-10:
             pairs.append((s, y, curvature))
-            del pairs[:-_MEMORY]
+            del pairs[:-MEMORY]
         positions, energy, gradient = moved, new_energy, new_gradient
-    return positions, energy, residual, iterations, planes
+    return positions, energy, residual, steps
 
 
 def _two_loop(gradient, pairs, factor):
-    q = gradient.copy()
+    q = gradient.ravel().copy()
     kept = []
     for s, y, curvature in reversed(pairs):
-        a = float(np.einsum("ij,ij->", s, q)) / curvature
+        a = float(s @ q) / curvature
         q -= a * y
         kept.append(a)
-    r = factor.solve(q)
+    r = factor.solve(q.reshape(gradient.shape)).ravel()
     for (s, y, curvature), a in zip(pairs, reversed(kept), strict=True):
-        r += (a - float(np.einsum("ij,ij->", y, r)) / curvature) * s
-    return r
+        r += (a - float(y @ r) / curvature) * s
+    return r.reshape(gradient.shape)
 
 
 def step(model: Model, state: State, control: Control, dt: float, *, max_iterations: int = 12) -> State:

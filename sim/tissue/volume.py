@@ -9,42 +9,39 @@ is zero. What the paper's k2 term does (keep the prism's shape about its centre 
 import numpy as np
 from scipy import sparse
 
-#: The boundary of a prism (corners 0 1 2 above, 3 4 5 below), seen from outside. Its sides are ruled surfaces: the
-#: mean of both ways to split each makes the volume symmetric in its corners.
-_BOUNDARY = [((0, 1, 2), 1.0), ((3, 5, 4), 1.0)] + [
-    (corner, 0.5)
-    for i, j in ((0, 1), (1, 2), (2, 0))
-    for corner in ((i, i + 3, j + 3), (i, j + 3, j), (i, i + 3, j), (i + 3, j + 3, j))
-]
-_PAIRS = [(i, j) for i in range(6) for j in range(i + 1, 6)]
-
-
-def _coefficients() -> np.ndarray:
-    """(6, 15): gradient of the volume at corner i = Σ over pairs of coefficient x (x_j cross x_k)."""
-    table = np.zeros((6, len(_PAIRS)))
-    for corner, weight in _BOUNDARY:
-        for shift in range(3):
-            i, j, k = (corner[(shift + s) % 3] for s in range(3))
-            sign = 1 if j < k else -1
-            table[i, _PAIRS.index((min(j, k), max(j, k)))] += sign * weight / 6
-    return table
-
-
-_TABLE = _coefficients()
-
 
 def volumes_and_gradients(positions: np.ndarray, prisms: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Volumes (t,) mm³ of prisms (t, 6), positive when the right way round, and their gradients (6, 3, t)."""
-    p = positions[prisms]  # (t, 6, 3)
-    p = np.ascontiguousarray((p - p.mean(axis=1, keepdims=True)).transpose(1, 2, 0))  # (6, 3, t)
-    cross = np.empty((len(_PAIRS), 3, p.shape[2]))
-    for row, (i, j) in enumerate(_PAIRS):
-        a, b = p[i], p[j]
-        cross[row, 0] = a[1] * b[2] - a[2] * b[1]
-        cross[row, 1] = a[2] * b[0] - a[0] * b[2]
-        cross[row, 2] = a[0] * b[1] - a[1] * b[0]
-    grad = (_TABLE @ cross.reshape(len(_PAIRS), -1)).reshape(p.shape)
-    return np.einsum("ijk,ijk->k", p, grad) / 3, grad
+    """Volumes (t,) mm³ of prisms (t, 6), positive when the right way round, and their gradients (6, 3, t).
+
+    The sides are ruled surfaces (their volume is the mean of both ways to split each quad), so a section parallel to the
+    triangles has edges that change linearly from the one triangle, a, to the other, b. With the edges e, f of each, and
+    D the sum of the three connecting vectors, the integral over the sections is V = - D · N / 6,
+    N = [e_a x f_a + e_b x f_b + (e_a + e_b) x (f_a + f_b)] / 6.
+    """
+    p = positions.T[:, prisms.T]  # (3, 6, t)
+    e_a, f_a, e_b, f_b = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0], p[:, 4] - p[:, 3], p[:, 5] - p[:, 3]
+    e, f = e_a + e_b, f_a + f_b
+    through = p[:, 3] + p[:, 4] + p[:, 5] - p[:, 0] - p[:, 1] - p[:, 2]
+    normal = (_cross(e_a, f_a) + _cross(e_b, f_b) + _cross(e, f)) / -36
+    volume = np.einsum("ij,ij->j", normal, through)
+    grad = np.empty((6, 3, len(prisms)))
+    scaled = through / -36
+    grad[1], grad[2] = _cross(f_a + f, scaled), _cross(scaled, e_a + e)
+    grad[4], grad[5] = _cross(f_b + f, scaled), _cross(scaled, e_b + e)
+    np.subtract(-normal, grad[1] + grad[2], out=grad[0])
+    np.subtract(normal, grad[4] + grad[5], out=grad[3])
+    grad[1:3] -= normal
+    grad[4:6] += normal
+    return volume, grad
+
+
+def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """(3, t), of the columns of a and b (3, t)."""
+    out = np.empty_like(a)
+    np.subtract(a[1] * b[2], a[2] * b[1], out=out[0])
+    np.subtract(a[2] * b[0], a[0] * b[2], out=out[1])
+    np.subtract(a[0] * b[1], a[1] * b[0], out=out[2])
+    return out
 
 
 def prism_volumes(positions: np.ndarray, prisms: np.ndarray) -> np.ndarray:
