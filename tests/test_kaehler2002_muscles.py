@@ -112,7 +112,9 @@ def _chain(roots, tips, nodes_between=1, share_tip=True):
     stations = np.concatenate([np.linspace(a, b, p) for a, b in zip(roots, tips, strict=True)]).astype(float)
     muscle = np.repeat(np.arange(k), p)
     first = np.flatnonzero(np.arange(k * p) % p != p - 1)
-    pairs = np.array([[p - 1, i * p + p - 1] for i in range(1, k)]).reshape(-1, 2) if share_tip else np.zeros((0, 2), int)
+    pairs = (
+        np.array([[p - 1, i * p + p - 1] for i in range(1, k)]).reshape(-1, 2) if share_tip else np.zeros((0, 2), int)
+    )
     zero, total = np.zeros((k, 3)), np.linalg.norm(np.subtract(tips, roots), axis=1)
     return Axes(
         muscles=np.arange(k),
@@ -120,6 +122,7 @@ def _chain(roots, tips, nodes_between=1, share_tip=True):
         flat=np.zeros(k, bool),
         centre=zero,
         line=zero,
+        lip=np.full(k, -1),
         slide=np.zeros(k),
         shortening=np.full(k, 0.3),
         stations=stations,
@@ -140,7 +143,7 @@ def _chain(roots, tips, nodes_between=1, share_tip=True):
 
 def _settled(axes, contraction, parameters=DEFAULT):
     c = np.asarray(contraction, float)
-    aim = aims(axes, axes.stations, axes.centre, axes.line, axes.normal, c)
+    aim = aims(axes, axes.stations, axes.centre, axes.line, axes.normal, c, axes.slide * c)
     return aim, settled(axes, axes.stations, aim, c, parameters, 1e-6)
 
 
@@ -170,7 +173,7 @@ def test_forces_between_muscles_are_the_gradient_of_their_energy():
     rng = np.random.default_rng(5)
     axes = _chain([[0, 0, 0], [20, 3, 1], [5, 12, 2]], [[10, 0, 0]] * 3, 2)
     c = np.array([0.7, 0.0, 0.3])
-    aim = aims(axes, axes.stations, axes.centre, axes.line, axes.normal, c)
+    aim = aims(axes, axes.stations, axes.centre, axes.line, axes.normal, c, axes.slide * c)
     moved = rng.normal(size=(axes.count, 3))
 
     def of(u):

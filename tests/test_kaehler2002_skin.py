@@ -137,8 +137,8 @@ def test_no_vertex_passes_the_skull():
         return -skull_energy(x, skull, np.eye(3), np.zeros(3))[1] - [0, 0, 100.0]
 
     x, v = at, np.zeros((3, 3))
-    for _ in range(3000):
-        x, v = advance(force, x, v, one, 2e-3, damping=20.0)
+    for _ in range(600):
+        x, v = advance(force, x, v, one, 1e-2, damping=20.0)
         assert (x[:, 2] > 0).all()
     assert x[:, 2] == pytest.approx(np.full(3, 1 / 3), abs=1e-3)
 

@@ -42,7 +42,13 @@ class ActingModel:
 
 DEFAULT = "headshop"
 
-MODELS = {model.name: model for model in (ActingModel("headshop", "Head Shop", "tissue"),)}
+MODELS = {
+    model.name: model
+    for model in (
+        ActingModel("headshop", "Head Shop", "tissue"),
+        ActingModel("kaehler", "Kähler et al. 2002", "tissue.kaehler2002"),
+    )
+}
 
 
 def model_named(name: str = DEFAULT) -> ActingModel:

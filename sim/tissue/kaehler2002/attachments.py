@@ -73,7 +73,7 @@ def stacked(holds, depths, opacity: float) -> np.ndarray:
 def _hold(vertices, normal, jaw, fibres: Fibres, rows, deepest):
     """Hold (n,) 0..1 of one muscle, its depth (n,) mm and the weights (n, k) sparse of its points, rows sum to 1."""
     n = len(vertices)
-    points, fibre, along = fibres.points[rows], fibres.fibre[rows], fibres.along[rows]
+    points, fibre = fibres.points[rows], fibres.fibre[rows]
     box = (vertices > points.min(axis=0) - _DEPTH - _BESIDE) & (vertices < points.max(axis=0) + _DEPTH + _BESIDE)
     near = np.flatnonzero(box.all(axis=1))
     inside = np.flatnonzero(fibre[1:] == fibre[:-1])

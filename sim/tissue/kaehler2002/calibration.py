@@ -57,7 +57,9 @@ def measured_gains(model, muscles, table: dict, rounds: int = 3) -> dict[str, fl
     axes, found = model.axes, {}
     for row, k in enumerate(axes.muscles):
         name = model.muscle_names[k]
-        if name.endswith("_r") or axes.slide[row] > 0:  # lips that protrude move more by their centre than by drawing in
+        if (
+            name.endswith("_r") or axes.slide[row] > 0
+        ):  # lips that protrude move more by their centre than by drawing in
             continue
         goal = float(table.get(base_name(name), {}).get("excursion_mm", 4.0))
         usual, gain = axes.shortening[row], 1.0

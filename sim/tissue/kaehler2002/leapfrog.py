@@ -13,7 +13,6 @@ from collections.abc import Callable
 
 import numpy as np
 
-
 #: The slowest rate believed of, per step squared: a slower motion is a drift along a valley, not a way to rest.
 _SLOWEST = 1e-3
 #: How many times its least a step may grow before nodes count as running away, and how often masses are doubled then.
@@ -83,7 +82,9 @@ def relax(force: Callable, x, stiffness, tolerance: float, max_steps: int, refre
         if not np.isfinite(size) or size > _AWAY * max(least, 0.1):
             if doubled == _DOUBLINGS:
                 _require_finite(ahead, "forces")
-                raise DivergedError(f"The tissue does not come to rest: after {step} steps it still moves by {size:.3g} mm.")
+                raise DivergedError(
+                    f"The tissue does not come to rest: after {step} steps it still moves by {size:.3g} mm."
+                )
             mass, x, v, before, doubled = 2 * mass, calm, np.zeros_like(x), None, doubled + 1
             least = np.inf
             continue

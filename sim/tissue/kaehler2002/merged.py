@@ -81,8 +81,9 @@ def axis_positions(axes: Axes, posed, moved) -> np.ndarray:
     return posed + np.concatenate([moved, np.zeros((1, 3))])[axes.node]
 
 
-def aims(axes: Axes, posed, centre, line, normal, contraction) -> np.ndarray:
-    """(s, 3) mm: where each muscle's own fibres would bring its axis at ``contraction`` (m,) 0..1 of `shortening`."""
+def aims(axes: Axes, posed, centre, line, normal, contraction, slide) -> np.ndarray:
+    """(s, 3) mm: where each muscle's own fibres would bring its axis at ``contraction`` (m,) 0..1 of `shortening`, with the
+    centres of sphincters moved by ``slide`` (m,) mm."""
     start = np.diff(axes.muscle, prepend=-1) != 0
     c = (axes.shortening * contraction)[axes.muscle]
     length = np.zeros(len(posed))
@@ -91,7 +92,7 @@ def aims(axes: Axes, posed, centre, line, normal, contraction) -> np.ndarray:
     along = np.cumsum(length)
     along -= np.repeat(along[start], np.diff(np.append(np.flatnonzero(start), len(posed))))
     straight, _ = on_polygons(posed, along, start, axes.muscle, (1 - c) * along)
-    shift = (axes.slide * contraction)[axes.muscle]
+    shift = slide[axes.muscle]
     keep = normal * axes.flat[axes.muscle, None]
     circular = drawn_together(posed, centre[axes.muscle], c, shift, line[axes.muscle], keep)
     return np.where(axes.round[axes.muscle, None], circular, straight)

@@ -10,6 +10,8 @@ from ..layers import build_layers, sheet_ties
 from ..lids import build_lids
 from ..model import strengths
 from ..parameters import DEFAULT as LAYERS
+from ..pressure import build_pressure
+from ..seal import build_seal
 from .attachments import build_attachments
 from .muscle_arrays import build_muscles
 from .parameters import DEFAULT, Parameters
@@ -53,6 +55,8 @@ def build_model(head: Head, parameters: Parameters = DEFAULT, table: dict | None
         axes=axes,
         lids=lids,
         contacts=build_surfaces(head, layers, ties),
+        seal=build_seal(head, layers),
+        pressure=build_pressure(head, layers, parameters),
         jaw=head.jaw,
         eyes=head.eyes,
         rest=rest,

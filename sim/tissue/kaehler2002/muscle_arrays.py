@@ -24,7 +24,8 @@ def movers(head: Head, table: dict) -> list[int]:
     return [
         k
         for k, m in enumerate(head.muscles)
-        if base_name(m.name) not in JAW_MUSCLES + LID_MUSCLES and table.get(base_name(m.name), {}).get("excursion_mm", 4.0) > 0
+        if base_name(m.name) not in JAW_MUSCLES + LID_MUSCLES
+        and table.get(base_name(m.name), {}).get("excursion_mm", 4.0) > 0
     ]
 
 
@@ -66,7 +67,9 @@ class _Surroundings:
 
 
 def _build_fibres(muscles: list[Muscle], around: _Surroundings) -> Fibres:
-    parts = {name: [] for name in ("points", "fibre", "muscle", "station", "start", "share", "normal", "thickness", "belly")}
+    parts = {
+        name: [] for name in ("points", "fibre", "muscle", "station", "start", "share", "normal", "thickness", "belly")
+    }
     fibre, station = 0, 0
     for k, muscle in enumerate(muscles):
         count, length = muscle.fibres.shape[:2]
@@ -133,6 +136,7 @@ def _build_axes(muscles: list[Muscle], rows, around: _Surroundings, p: Parameter
         flat=ring,
         centre=centre,
         line=outward,
+        lip=np.array([_lip(m) for m in muscles]),
         slide=np.where(circular & ~ring, p.protrusion, 0.0),
         shortening=_shortening(muscles, centre, total, table),
         stations=stations,
@@ -149,6 +153,12 @@ def _build_axes(muscles: list[Muscle], rows, around: _Surroundings, p: Parameter
         rest=rest,
         stiffness=stiffness,
     )
+
+
+def _lip(muscle: Muscle) -> int:
+    """0 in the upper lip, 1 in the lower, -1 elsewhere."""
+    arc = muscle.kind == "sphincter" and not muscle.ring
+    return int("upper" not in muscle.name) if arc else -1
 
 
 def _centre(muscle: Muscle) -> np.ndarray:

@@ -35,6 +35,10 @@ class Parameters:
     #: contact of lips, lids and teeth, which the paper leaves out, in multiples of ``skin``; lids held to their turn.
     contact: float = 6.0
     lid: float = 1500.0
+    #: air in the mouth, force per mm² of cheek; lips held together, per mm². Both are our own, as in the other solver.
+    puff: float = 12.0
+    puff_reach: float = 30.0
+    seal: float = 90.0
     #: grams per mm² of skin (5 mm of tissue at 1 g/cm³), the least mass of a vertex, damping per second, stiffness unit
     #: in g/s²: as in our own solver, so that both settle in a few frames.
     mass_area: float = 0.005

@@ -19,11 +19,15 @@ from .skin_mesh import mirrored
 from .sphincter import drawn_together
 from .structures import Axes, Model
 
+#: How far the centre of a lip goes behind its rest, and beyond the usual in front, as shares of `Parameters.protrusion`.
+_BACK, _FORTH = 1.5, 1.0
+
 
 @dataclass(frozen=True, eq=False)
 class Pose:
     """nodes (3 n, 3): skin carried by the jaw alone, feet and mirrored feet where they are; rotation (3, 3) and
-    translation (3,) of the mandible; fibres (k, 3); lid_node (v,), lid_goal (v, 3), lid_stiffness (v,); gaze (2,)."""
+    translation (3,) of the mandible; fibres (k, 3); lid_node (v,), lid_goal (v, 3), lid_stiffness (v,); gaze
+    (2, 2) of both eyes; puff -1..1 of the air in the mouth; seal 0..1 of the lips."""
 
     nodes: np.ndarray
     rotation: np.ndarray
@@ -33,6 +37,8 @@ class Pose:
     lid_goal: np.ndarray
     lid_stiffness: np.ndarray
     gaze: np.ndarray
+    puff: float
+    seal: float
 
 
 def carried(points, share, rotation, translation) -> np.ndarray:
@@ -40,15 +46,19 @@ def carried(points, share, rotation, translation) -> np.ndarray:
     return points + share[:, None] * (points @ rotation.T + translation - points)
 
 
-def muscle_shapes(model: Model, rotation, translation, contraction):
-    """The fibres under ``contraction`` (m,) 0..1: their points with the jaw alone and now (k, 3), rotation vectors (k, 3),
-    and the length that is left (k,) as a ratio."""
+def muscle_shapes(model: Model, rotation, translation, contraction, forward=(0.0, 0.0)):
+    """The fibres under ``contraction`` (m,) 0..1 and with the centres of the lips ``forward`` (upper, lower; -1..1).
+
+    Returns their points with the jaw alone and now (k, 3) mm, how their tangents turn as rotation vectors (k, 3), and the
+    length that is left (k,) as a ratio.
+    """
     fibres, axes = model.fibres, model.axes
     points = carried(fibres.points, fibres.share, rotation, translation)
     posed = carried(axes.stations, axes.share, rotation, translation)
     centre = carried(axes.centre, _mean_share(axes), rotation, translation)
     line, normal = axes.line, axes.normal
-    aim = aims(axes, posed, centre, line, normal, contraction)
+    way = slides(axes, contraction, forward)
+    aim = aims(axes, posed, centre, line, normal, contraction, way)
     axis = settled(axes, posed, aim, contraction, model.parameters) if axes.count else posed
     # how much each axis has shortened, and what it moved beside that
     start = np.diff(axes.muscle, prepend=-1) != 0
@@ -57,7 +67,7 @@ def muscle_shapes(model: Model, rotation, translation, contraction):
     c_axis[start] = 0.0
     last = np.append(np.flatnonzero(start)[1:], len(posed)) - 1
     whole = np.clip(1 - now[last] / np.maximum(before[last], 1e-9), 0.0, 0.6)[axes.muscle]
-    shift = (axes.slide * contraction)[axes.muscle]
+    shift = way[axes.muscle]
     own = contracted(posed, before, start, axes.muscle, c_axis)[0]
     flat = axes.flat[axes.muscle, None]
     together = drawn_together(posed, centre[axes.muscle], whole, shift, line[axes.muscle], normal * flat)
@@ -73,6 +83,13 @@ def muscle_shapes(model: Model, rotation, translation, contraction):
     here = np.where(around, drawn, slid) + beside[s]
     ratio = 1 - np.where(around[:, 0], whole[s], _local(c_axis, before, axes)[s])
     return points, here, np.where(around, 0.0, turned), np.clip(ratio, 0.4, 1.6)
+
+
+def slides(axes: Axes, contraction, forward) -> np.ndarray:
+    """(m,) mm by which the centre of each sphincter moves along its line: with the contraction of its lip, more of it or
+    back against the teeth as ``forward`` (upper, lower) says, -1..1."""
+    forward = np.clip(np.append(np.asarray(forward, float), 0.0), -1, 1)[axes.lip]
+    return axes.slide * contraction * (1 + np.where(forward < 0, _BACK, _FORTH) * forward)
 
 
 def _local(c_axis, before, axes: Axes) -> np.ndarray:
@@ -98,7 +115,7 @@ def pose_of(model: Model, control: Control) -> Pose:
     fibres = model.fibres.points
     if model.axes.count:
         contraction = np.clip(np.asarray(control.activations, float)[model.axes.muscles], 0, 1)
-        before, fibres, turned, ratio = muscle_shapes(model, rotation, translation, contraction)
+        before, fibres, turned, ratio = muscle_shapes(model, rotation, translation, contraction, control.lips)
         foot = foot + at.weights @ (fibres - before)
         offset = turned_by(at.weights @ turned, offset)
         outward = offset / np.maximum(np.linalg.norm(offset, axis=1, keepdims=True), 1e-9)
@@ -109,7 +126,9 @@ def pose_of(model: Model, control: Control) -> Pose:
         translation,
         fibres,
         *_lid_goals(model, control),
-        np.asarray(control.gaze, float),
+        np.array([control.gaze_of(side) for side in "lr"]),
+        float(np.clip(control.cheeks, -1, 1)),
+        float(np.clip(control.seal, 0, 1)),
     )
 
 
@@ -128,7 +147,7 @@ def _lid_goals(model: Model, control: Control):
     closure = np.asarray(control.lids, float).reshape(2, 2)
     for lids in model.lids:
         upper, lower = closure["lr".index(lids.side)]
-        way = lid_targets(lids, upper, lower, control.gaze) - lid_targets(lids, 0.0, 0.0, np.zeros(2))
+        way = lid_targets(lids, upper, lower, control.gaze_of(lids.side)) - lid_targets(lids, 0.0, 0.0, np.zeros(2))
         node.append(lids.column)
         goal.append(model.rest[lids.column] + way)
         stiffness.append(model.parameters.lid * lids.hold)

@@ -110,7 +110,7 @@ def diagnose(model: Model, pose: Pose, planes: Planes, positions, residual: floa
     for lids in model.lids:
         column = lids.contact_column
         gap = np.linalg.norm(positions[column] - lids.eye.centre, axis=1)
-        gap -= eyeball_radius(lids, positions[column], pose.gaze) + np.minimum(lids.clearance, 0)
+        gap -= eyeball_radius(lids, positions[column], pose.gaze["lr".index(lids.side)]) + np.minimum(lids.clearance, 0)
         deepest = max(deepest, -float(gap.min(initial=0.0)))
     height, _ = heights(positions, model.skull, pose.rotation, pose.translation)
     return {

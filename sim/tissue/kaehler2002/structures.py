@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from ...anatomy.head import Eye, Jaw
-from ..structures import Layers, Springs
+from ..seal import Seal
+from ..structures import Layers, Pressure, Springs
 from .parameters import Parameters
 
 
@@ -37,8 +38,8 @@ class Axes:
     """The spring mesh along the muscles' middle axes (2002, section 3): s stations, q nodes, c springs, m muscles.
 
     muscles (m,) indices into the names of the model; round (m,) bool: contracts toward a centre; flat (m,) bool: a ring
-    that slides on its surface; centre, line (m, 3): that centre, and the unit line it moves along; slide (m,) mm at full
-    contraction; shortening (m,) share of its length lost then
+    that slides on its surface; centre, line (m, 3): that centre, and the unit line it moves along; lip (m,) 0 upper,
+    1 lower, -1 none; slide (m,) mm at full contraction; shortening (m,) share of its length lost then
     stations (s, 3) mm; muscle (s,); along (s,) mm from the root; total (m,) mm; share (s,); normal (s, 3); node (s,), -1
     where fixed to bone; bed (s,) stiffness
     first, second (c,) stations; owner (c,) muscle, -1 for ties between muscles; rest (c,) mm; stiffness (c,) per strain
@@ -49,6 +50,7 @@ class Axes:
     flat: np.ndarray
     centre: np.ndarray
     line: np.ndarray
+    lip: np.ndarray
     slide: np.ndarray
     shortening: np.ndarray
     stations: np.ndarray
@@ -115,6 +117,8 @@ class Model:
     axes: Axes
     lids: tuple
     contacts: Any
+    seal: Seal
+    pressure: Pressure
     jaw: Jaw
     eyes: tuple[Eye, Eye]
     rest: np.ndarray
