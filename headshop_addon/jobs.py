@@ -144,7 +144,10 @@ class Job:
         text = f"{self.bl_label}: {step.label}, {running.fraction:.0%}    |    Esc: cancel"
         for window in context.window_manager.windows:
             window.workspace.status_text_set(text)
-        _redraw_sidebars(context)
+        for area in _viewports(context):
+            for region in area.regions:
+                if region.type == "UI":  # the sidebar alone: drawing a big scan anew at every step takes its time
+                    region.tag_redraw()
 
     def _end(self, context):
         global running
@@ -157,7 +160,8 @@ class Job:
             self._timer = None
         for window in context.window_manager.windows:
             window.workspace.status_text_set(None)
-        _redraw_sidebars(context)
+        for area in _viewports(context):
+            area.tag_redraw()
 
 
 class FileJob(Job):
@@ -185,8 +189,7 @@ class FileJob(Job):
         return {"CANCELLED"}  # this call did nothing itself: no step to undo
 
 
-def _redraw_sidebars(context):
-    for window in context.window_manager.windows:
-        for area in window.screen.areas:
-            if area.type == "VIEW_3D":
-                area.tag_redraw()
+def _viewports(context):
+    """Every 3D viewport of every window."""
+    areas = (area for window in context.window_manager.windows for area in window.screen.areas)
+    return [area for area in areas if area.type == "VIEW_3D"]

@@ -23,10 +23,15 @@ def viewport_region(area, x: int, y: int):
 _RINGS = (5.0, 10.0, 18.0)
 
 
-def on_surface(context, area, region, at, obj):
+#: Specks in front of each other that a click passes through, and how far behind one it goes on, of the object's size.
+_LAYERS, _BEHIND = 8, 1e-5
+
+
+def on_surface(context, area, region, at, obj, specks=()):
     """The point of ``obj``'s surface under a region position, in the object's own space; None where there is none.
 
     In a hole it is the point under the mouse at the depth of the hole's rim: a landmark may lie in mid-air.
+    specks : (n,) bool, vertices (`sim.scan.specks`) that a click passes by
     """
     view = area.spaces.active.region_3d
     to_local = obj.matrix_world.inverted_safe()
@@ -41,8 +46,15 @@ def on_surface(context, area, region, at, obj):
     def hit(dx, dy):
         """Depth of what is hit and whether its outside is seen; (None, False) where nothing is."""
         start, along = ray(dx, dy)
-        found, point, normal, _face = obj.ray_cast(start, along, depsgraph=graph)
-        return ((point - start).length, normal.dot(along) < 0) if found else (None, False)
+        begin = start
+        for _ in range(_LAYERS):
+            found, point, normal, face = obj.ray_cast(begin, along, depsgraph=graph)
+            if not found:
+                break
+            if not _is_speck(obj.data, face, specks):
+                return (point - start).length, normal.dot(along) < 0
+            begin = point + along * max(obj.dimensions) * _BEHIND
+        return None, False
 
     start, along = ray(0, 0)
     depth, outside = hit(0, 0)
@@ -54,3 +66,11 @@ def on_surface(context, area, region, at, obj):
             depth = median(rim)
             break
     return None if depth is None else start + along * depth
+
+
+def _is_speck(data, face: int, specks) -> bool:
+    """Whether a face that was hit belongs to a speck; faces that a modifier made never do."""
+    if not len(specks) or face >= len(data.polygons):
+        return False
+    first = data.polygons[face].vertices[0]
+    return first < len(specks) and bool(specks[first])

@@ -12,14 +12,13 @@ from scipy.spatial import cKDTree
 
 from ..sim.mesh import Mesh, vertex_normals
 from ..sim.progress import Progress, Work
-from ..sim.scan.clean import components
+from ..sim.scan.specks import specks
 from .skin_paint import adjacency, smoothed, spread
 
 NEIGHBOURS = 4
 BLOCK = 60_000  # texels painted between two steps of progress
 #: mm beyond the scan's own spacing within which its colour counts fully, and beyond which it does not count
 NEAR, FAR = 1.5, 4.0
-SPECK = 150.0  # mm²: loose pieces of a scan smaller than this lend no colour
 SIZE = 768  # pixels: texels of about 0.7 mm, finer than most scans
 EVENING = 0.55  # how much of the broad shading is taken out
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
@@ -42,7 +41,7 @@ class ScanColour:
     """
 
     def __init__(self, scan: Mesh):
-        whole = ~_specks(scan)
+        whole = ~specks(scan)
         points = scan.vertices[whole]
         self.normals = vertex_normals(scan.vertices, scan.triangles)[whole]
         self.colour = to_linear(np.asarray(scan.colour, dtype=float)[whole])
@@ -61,15 +60,6 @@ class ScanColour:
         near = self.spacing + NEAR
         confidence = np.clip((near + FAR - NEAR - distance[:, 0]) / (FAR - NEAR), 0, 1) * facing.max(axis=1)
         return colour, confidence
-
-
-def _specks(scan: Mesh) -> np.ndarray:
-    """(n,) bool: vertices of loose pieces so small that their colour is the scanner's; none if all pieces are."""
-    triangles = scan.triangles
-    _, label = components(triangles, len(scan.vertices))
-    a, b, c = scan.vertices[triangles].transpose(1, 0, 2)
-    area = np.bincount(label[triangles[:, 0]], np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2, label.max() + 1)
-    return (area < SPECK)[label] & (area.max() >= SPECK)
 
 
 def iris_colour(scan: Mesh, eyes) -> np.ndarray | None:

@@ -3,7 +3,7 @@
 
 import bpy
 
-from ..headshop_addon import active, dependencies, landmark_overlay, picking
+from ..headshop_addon import active, bridge, dependencies, landmark_overlay, picking
 from ..headshop_addon import scan_landmarks as landmarks
 from ..headshop_addon.bridge import METRES
 from ..sim.anatomy.landmark_names import label
@@ -49,8 +49,11 @@ class HEADSHOP_OT_click_landmarks(bpy.types.Operator):
         if context.area is None or context.area.type != "VIEW_3D":
             self.report({"ERROR"}, "Landmarks are clicked in a 3D viewport: start from its sidebar.")
             return {"CANCELLED"}
+        from ..sim.scan.specks import specks
+
         self._area = context.area
         self._scan = active.scan(context)
+        self._specks = specks(bridge.object_to_mesh(self._scan))
         self._steps = []
         self._skipped = []
         self._chosen = self.start or None
@@ -93,7 +96,7 @@ class HEADSHOP_OT_click_landmarks(bpy.types.Operator):
         self._finish(context)
 
     def _click(self, context, region, at):
-        hit = picking.on_surface(context, self._area, region, at, self._scan)
+        hit = picking.on_surface(context, self._area, region, at, self._scan, self._specks)
         if hit is None:
             self.report({"WARNING"}, "Click on the scan, or skip this landmark with N.")
             return {"RUNNING_MODAL"}

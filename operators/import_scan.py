@@ -33,7 +33,8 @@ class HEADSHOP_OT_import_scan(FileJob, ImportHelper, bpy.types.Operator):
 
     filename_ext = ""
     filter_glob: bpy.props.StringProperty(
-        default="*.ply;*.obj;*.stl;*.glb;*.gltf;*.usd;*.usda;*.usdc;*.usdz;*.fbx;*.ech;*.npz;*.json", options={"HIDDEN"}
+        default="*.ply;*.obj;*.stl;*.glb;*.gltf;*.usd;*.usda;*.usdc;*.usdz;*.fbx;*.ech;*.echo;*.cyb;*.cyber;*.npz;*.json",
+        options={"HIDDEN"},
     )
     unit: bpy.props.EnumProperty(name="Unit", description="Unit of length in the file", items=UNITS)
     up: bpy.props.EnumProperty(name="Up", description="Direction of the crown of the head in the file", items=UP)

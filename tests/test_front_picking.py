@@ -81,6 +81,29 @@ def test_a_moved_and_scaled_scan_is_hit_in_its_own_space(bpy, view, scan):
     assert tuple(point) == pytest.approx((0.0155, -0.1, 0.0105), abs=1e-4)
 
 
+def test_a_speck_before_the_face_is_clicked_through(bpy, view, scan):
+    from headshop.headshop_addon import bridge, picking
+    from headshop.sim.mesh import Mesh
+    from headshop.sim.scan.specks import specks
+
+    whole = bridge.object_to_mesh(scan)
+    corners = np.array([[48.0, -120, 20], [54, -120, 20], [51, -120, 24]])
+    dirt, count = np.concatenate([corners, corners - [0, 5, 0]]), len(whole.vertices)
+    faces = np.full((2, 4), -1, dtype=np.int32)
+    faces[:, :3] = count + np.arange(6).reshape(2, 3)
+    mesh = Mesh(np.concatenate([whole.vertices, dirt]), np.concatenate([whole.faces, faces]))
+    dirty = bridge.mesh_to_object(mesh, "Dirty")
+    bpy.context.scene.collection.objects.link(dirty)
+    bpy.context.view_layer.update()
+    found = specks(mesh)
+    assert found[-6:].all() and not found[whole.triangles].any()
+    point = picking.on_surface(bpy.context, *view, (151, 121), dirty, found)
+    assert tuple(point) == pytest.approx((0.051, -0.1, 0.021), abs=1e-4)
+    point = picking.on_surface(bpy.context, *view, (151, 121), dirty)
+    assert point[1] == pytest.approx(-0.125, abs=1e-4)
+    assert not specks(Mesh(dirt, faces - (faces >= 0) * count)).any(), "a scan of specks alone keeps them"
+
+
 def test_clicks_on_the_sidebar_are_not_clicks_on_the_scan(blender):
     from headshop.headshop_addon import picking
 
