@@ -46,6 +46,7 @@ MODELS = {
     model.name: model
     for model in (
         ActingModel("headshop", "Head Shop", "tissue"),
+        ActingModel("waters", "Waters 1987", "muscle"),
         ActingModel("kaehler", "Kähler et al. 2002", "tissue.kaehler2002"),
     )
 }
