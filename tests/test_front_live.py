@@ -10,7 +10,7 @@ import pytest
 @pytest.fixture
 def skin(addon, reference, reference_model, monkeypatch):
     """The skin of a head made of the reference; its tissue is built once for all tests."""
-    from headshop.headshop_addon import heads, shape_keys
+    from headshop.headshop_addon import heads
     from headshop.sim.tissue import model
 
     def build_model(head):
@@ -19,7 +19,6 @@ def skin(addon, reference, reference_model, monkeypatch):
 
     build = model.build_model
     monkeypatch.setattr(model, "build_model", build_model)
-    monkeypatch.setattr(shape_keys, "build_model", build_model)
     heads.create_head(reference, "Ref")
     return heads.find_heads()[0]
 

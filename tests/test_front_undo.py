@@ -11,11 +11,10 @@ import pytest
 @pytest.fixture
 def scene(addon, reference, reference_model, monkeypatch):
     """A scan with landmarks and a head of the reference, active; the head's tissue is built once for all tests."""
-    from headshop.headshop_addon import bridge, heads, performance, scan_landmarks, scan_objects, shape_keys
+    from headshop.headshop_addon import bridge, heads, scan_landmarks, scan_objects
     from headshop.sim.tissue import model
 
-    for module in (model, performance, shape_keys):
-        monkeypatch.setattr(module, "build_model", lambda head: reference_model)
+    monkeypatch.setattr(model, "build_model", lambda head: reference_model)
     scan = bridge.mesh_to_object(reference.skin, "Scan")
     addon.context.scene.collection.objects.link(scan)
     addon.context.scene.headshop.scan = scan
