@@ -14,6 +14,7 @@ import bpy
 import numpy as np
 from bpy.app.handlers import persistent
 
+from ..sim.acting.models import model_named
 from ..sim.errors import InputError
 from . import bridge, dependencies, heads, jobs, muscle_names
 
@@ -23,6 +24,8 @@ KEY = "Live"
 LOOK, ROUND, REST = 10, 25, 60
 #: The timer stops when a round moves no vertex by more than this (mm), or after so many rounds.
 VISIBLE, ROUNDS = 0.05, 12
+#: `HEADSHOP_PG_object.model` -> the name of a model that keeps up with a slider.
+MODELS = {"SIMULATED": "headshop", "DIRECT": "waters"}
 STILL = 0.001  # mm: a part that never moved more needs no key
 
 _depth = 0  # > 0 while nothing must follow
@@ -30,8 +33,9 @@ _depth = 0  # > 0 while nothing must follow
 
 @dataclass
 class _Following:
-    """What is simulated for one skin: its model, where it rests, the last state and the sliders it belongs to."""
+    """What acts for one skin: its model, where it rests, the last state and the sliders it belongs to."""
 
+    acting: Any
     fingerprint: int
     model: Any
     neutral: dict[str, np.ndarray]
@@ -69,6 +73,11 @@ def on_switch(group, _context):
         follow(skin)
     else:
         rest(skin)
+
+
+def on_model(group, _context):
+    """Another model is to act."""
+    follow(group.id_data)
 
 
 def sliders(skin, depsgraph=None) -> dict[str, float]:
@@ -153,7 +162,6 @@ def _try(skin, values, iterations) -> _Following | None:
 def _solve(skin, values, iterations) -> _Following | None:
     from ..sim.acting.pose import control, pose_from
     from ..sim.tissue.posing import posed_parts
-    from ..sim.tissue.solver import rest_state, solve
 
     moving = any(values.values())
     following = _current(skin, moving)
@@ -164,11 +172,11 @@ def _solve(skin, values, iterations) -> _Following | None:
     if moving:
         known = {*following.model.muscle_names, *muscle_names.CONTROLS}
         wanted = control(following.model, pose_from({name: v for name, v in values.items() if name in known}))
-        solution = solve(following.model, wanted, following.state, max_iterations=iterations)
-        following.state, following.settled = solution.state, solution.converged or iterations == REST
-        posed = posed_parts(following.model, solution.state, wanted)
+        following.state, settled = following.acting.look(following.model, wanted, following.state, iterations)
+        following.settled = settled or iterations == REST
+        posed = posed_parts(following.model, following.state, wanted)
     else:  # rest is the scan itself, exactly
-        following.state, posed = rest_state(following.model), following.neutral
+        following.state, posed = following.acting.rest_state(following.model), following.neutral
     objects = heads.parts_of(skin)
     for part, vertices in posed.items():
         _write(skin, objects[part], vertices - following.neutral[part])
@@ -182,16 +190,15 @@ def _current(skin, moving: bool) -> _Following | None:
         return None
     mark = fingerprint(skin)
     following = _following.get(skin.session_uid)
-    if following is not None and following.fingerprint == mark:
+    acting = model_named(MODELS[skin.headshop.model])
+    if following is not None and (following.fingerprint, following.acting) == (mark, acting):
         return following
     from ..sim.acting.pose import Pose, control
-    from ..sim.tissue.model import build_model
     from ..sim.tissue.posing import posed_parts
-    from ..sim.tissue.solver import rest_state
 
-    model = build_model(heads.read_head(skin))
-    state = rest_state(model)
-    following = _Following(mark, model, posed_parts(model, state, control(model, Pose())), state)
+    model = acting.build(heads.read_head(skin))
+    state = acting.rest_state(model)
+    following = _Following(acting, mark, model, posed_parts(model, state, control(model, Pose())), state)
     _following[skin.session_uid] = following
     return following
 

@@ -37,6 +37,13 @@ DETAIL = (
 )
 
 
+#: What moves the face under the sliders.
+MODELS = (
+    ("SIMULATED", "Simulated", "Tissue that muscles pull on comes to rest; what a bake keeps"),
+    ("DIRECT", "Direct", "Muscles displace the skin itself (Waters 1987); at once, a preview"),
+)
+
+
 #: Which faces are relaxed when a head is built.
 RELAX = (
     ("AUTO", "Parted Lips", "Relax a face whose lips are parted"),
@@ -124,6 +131,13 @@ class HEADSHOP_PG_object(bpy.types.PropertyGroup):
         default=True,
         options=set(),
         update=live.on_switch,
+    )
+    model: EnumProperty(
+        name="Model",
+        description="What moves the face under the sliders. Bakes are always simulated",
+        items=MODELS,
+        options=set(),
+        update=live.on_model,
     )
     detail: EnumProperty(
         name="Detail",

@@ -24,6 +24,9 @@ class HEADSHOP_PT_muscles(SidebarPanel, bpy.types.Panel):
             layout.label(text=heads.head_name(skin), icon="OUTLINER_OB_MESH")
         layout.prop(skin.headshop, "live", text="Face Follows Sliders", toggle=True, icon="PLAY")
         row = layout.row(align=True)
+        row.active = skin.headshop.live
+        row.prop(skin.headshop, "model", expand=True)
+        row = layout.row(align=True)
         row.operator("headshop.key_sliders", text="Key All", icon="KEY_HLT")
         row.operator("headshop.reset_muscles", icon="LOOP_BACK")
 

@@ -170,3 +170,19 @@ def test_other_objects_have_sliders_that_do_nothing(addon):
     obj = addon.data.objects.new("Lamp", None)
     obj.headshop.muscles.corrugator_l = 1.0
     obj.headshop.live = False
+
+
+def test_the_other_model_takes_over_and_hands_back(skin):
+    from headshop.headshop_addon import live
+
+    skin.headshop.muscles.zygomaticus_major_l = 0.8
+    simulated = live_delta(skin)
+    skin.headshop.model = "DIRECT"
+    direct = live_delta(skin)
+    assert live._following[skin.session_uid].acting.name == "waters" and live._following[skin.session_uid].settled
+    assert 5 < np.linalg.norm(direct, axis=1).max() < 12 and np.abs(direct - simulated).max() > 1
+    skin.headshop.muscles.zygomaticus_major_l = 0.0
+    assert peak(skin) == 0.0
+    skin.headshop.model = "SIMULATED"
+    skin.headshop.muscles.zygomaticus_major_l = 0.8
+    assert live_delta(skin) == pytest.approx(simulated, abs=0.05)

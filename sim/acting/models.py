@@ -3,8 +3,9 @@
 
 A model is a package of `sim` with two modules: ``model`` holds ``build_model(head)``; ``solver`` holds
 ``rest_state(model)`` and ``solve(model, control, state=None, *, max_iterations, tolerance)``, with `structures.Control` in
-and `structures.Solution` out. What is built has what `pose.control` and `posing.posed_parts` read (``muscle_names``,
-``count``, ``jaw``, ``eyes``, ``rigid``), a state has ``skin`` (n, 3) mm. Packages are imported when they are asked for.
+and `structures.Solution` out; one that does not iterate may have ``look(model, control)`` besides. What is built has what
+`pose.control` and `posing.posed_parts` read (``muscle_names``, ``count``, ``jaw``, ``eyes``, ``rigid``), a state has
+``skin`` (n, 3) mm. Packages are imported when they are asked for.
 """
 
 from dataclasses import dataclass
@@ -35,6 +36,14 @@ class ActingModel:
     def solve(self, model, control: Control, state=None, **limits) -> Solution:
         """The pose at rest; ``state`` is where to start, ``limits`` are max_iterations and tolerance (mm)."""
         return self._module("solver").solve(model, control, state, **limits)
+
+    def look(self, model, control: Control, state, rounds: int) -> tuple[Any, bool]:
+        """The pose for a slider that is being dragged: a state after ``rounds`` iterations, and whether it is at rest."""
+        solver = self._module("solver")
+        if hasattr(solver, "look"):  # quicker without the numbers about it
+            return solver.look(model, control)
+        solution = solver.solve(model, control, state, max_iterations=rounds)
+        return solution.state, solution.converged
 
     def _module(self, name: str):
         return import_module(f"..{self.package}.{name}", __package__)

@@ -44,6 +44,7 @@ class Model:
     reaches, squares : sparse (n, k), mm that each muscle moves the skin by at full tension, and mm²
     rings : s times (muscle, `Sphincter`, tie of its centre); squeezes : (s, n) K F
     lids_at_rest : for each of ``lids`` its vertices (v, 3) mm as `lid_targets` has them open
+    hung : (j,) vertices that go with the jaw
     firm : (n,) how far the skin lies on bone; normal : (n, 3) outward, evened out
     """
 
@@ -64,6 +65,7 @@ class Model:
     lids: tuple[Lids, ...]
     lids_at_rest: tuple[np.ndarray, ...]
     contacts: Surfaces
+    hung: np.ndarray
     jaw: Jaw
     eyes: tuple[Eye, Eye]
     faces: np.ndarray
@@ -127,6 +129,7 @@ def build_model(head: Head, table: dict | None = None) -> Model:
         lids=lids,
         lids_at_rest=tuple(lid_targets(each, 0.0, 0.0, np.zeros(2)) for each in lids),
         contacts=build_surfaces(head, layers, ties),
+        hung=np.flatnonzero(layers.jaw > 0),
         jaw=head.jaw,
         eyes=head.eyes,
         faces=head.skin.faces,

@@ -36,6 +36,11 @@ def solve(model: Model, control: Control, state: State | None = None, **_limits)
     return Solution(State(skin), True, 0.0, 1, {"residual": 0.0, **found})
 
 
+def look(model: Model, control: Control) -> tuple[State, bool]:
+    """The pose without the numbers about it, and that it is at rest."""
+    return State(displaced(model, control)), True
+
+
 def displaced(model: Model, control: Control) -> np.ndarray:
     """(n, 3) mm, the skin in the pose."""
     tension = np.clip(np.asarray(control.activations, float), 0, 1)
@@ -44,7 +49,8 @@ def displaced(model: Model, control: Control) -> np.ndarray:
     pivot = (model.jaw.condyle_l + model.jaw.condyle_r) / 2
     skin = model.skin
     if not closed:
-        skin = turned(skin, model.layers.jaw, rotation, translation, pivot)
+        skin = skin.copy()
+        skin[model.hung] = turned(skin[model.hung], model.layers.jaw[model.hung], rotation, translation, pivot)
     total = resultant(model, skin, tension, rotation, translation)
     normal = model.normal
     if not closed:
