@@ -8,10 +8,13 @@ import numpy as np
 
 from ..acting.plain_posing import plainly_posed
 from ..adapt.rest import rest_of
+from ..adapt.thin_plate_spline import similarity
 from ..anatomy.head import Head
 from ..errors import InputError
+from ..mesh_subdivision import drawn
 from ..tissue.jaw import jaw_transform
 from .relaxed import Relaxed, relaxed
+from .upper_teeth import incisal_edge
 
 if TYPE_CHECKING:
     from ..adapt.skin_fit import SkinFit
@@ -34,7 +37,11 @@ def neutral_of(fit: "SkinFit", choice: str) -> Relaxed | None:
     An open mouth is always closed for that, as flesh over bone is known of closed ones; `kept_open` opens it again.
     """
     if choice == "always" or fit.reference is not fit.lips_closed:
-        return relaxed(fit.lips_closed, fit.cage, fit.fitted.fitted, fit.unseen)
+        skin = drawn(fit.lips_closed.skin.faces, fit.cage)
+        matrix, _ = similarity(fit.lips_closed.skin.vertices, skin)
+        forward = -matrix[:, 1] / np.linalg.norm(matrix[:, 1])
+        teeth = incisal_edge(fit.target, fit.lips_closed.landmarks.on({"skin": skin}), forward)
+        return relaxed(fit.lips_closed, fit.cage, fit.fitted.fitted, fit.unseen, teeth)
     return None
 
 

@@ -6,29 +6,26 @@ Points of a face, laid on the reference by what expressions do not move, differ 
 
     y = d + E a + e + noise,   d ~ N(0, K),  e ~ N(0, K_e),  a >= 0
 
-``K`` is the covariance of neutral people (`people`), ``K_e`` is large only where ``E a`` is. The contractions are those
-of generalised least squares with shrinkage, the rest is the mean of a Gaussian process given the data (Rasmussen and
-Williams 2006, equations 2.25 and 2.42).
+``K`` is the covariance of neutral people (`people`), ``K_e``, that of `unlike`, is large only where ``E a`` is. The
+contractions are those of generalised least squares with shrinkage, the rest is the mean of a Gaussian process given the
+data (Rasmussen and Williams 2006, equations 2.25 and 2.42).
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve, solve_triangular
-from scipy.spatial.distance import cdist
+from scipy.sparse import diags
 
 from ..acting.expressions import expressions
+from ..anatomy.head import Jaw
 from .responses import Responses
+from .unlike import unlike
 
 OPEN = 1.0  # opening of the jaw that shrinkage expects
 SMILE = 2.0  # strength of a smile, by the joy of the table of expressions, that it expects
 ALONE = 0.5  # contraction of a muscle beyond its share in the smile
 UNEVEN = 0.15  # difference between the sides
-#: What our muscles do otherwise than a person's: share of what they do, and
-#: its reaches in mm with their shares of the variance.
-UNLIKE = 0.6
-REACHES = ((16.0, 0.5), (6.0, 0.5))
-LEAST = 0.4  # mm of the same where little moves, at the mouth
 ROUNDS = 3
 
 
@@ -43,57 +40,49 @@ class Expression:
     modelled: np.ndarray
 
 
-def explain(table: Responses, vertices, sampling, offsets, people, noise, names=None) -> Expression:
+def explain(
+    table: Responses, vertices, jaw: Jaw, sampling, offsets, people, noise, names=None, still=None
+) -> Expression:
     """The `Expression` of a face.
 
     Parameters
     ----------
     table : how the reference's skin answers
     vertices : (n, 3) mm, the reference's skin
+    jaw : the reference's
     sampling : (k, n) sparse, rows that give the points from the vertices
     offsets : (k, 3) mm, the face's points less the reference's, laid on it
     people : (3 k, 3 k) mm², covariance of neutral people's
+    noise : mm, one, (k,) or (k, 3), by which points may be wrong
     names : the muscles to consider (all of the table by default)
-    noise : mm, one or (k,), by which points may be wrong
+    still : (k,) bool, points that are known as they are without any expression (None: none)
     """
     from scipy.optimize import nnls  # slow to load, and few scans have an open mouth
 
     pick = [k for k, name in enumerate(table.names) if names is None or name in names]
     fields = table.fields[pick]
     y = np.asarray(offsets, dtype=float).ravel()
-    still = np.repeat(np.broadcast_to(noise, len(offsets)) ** 2, 3)
-    # The lips touch, but what moves one does not move the other: distances are those of an open mouth.
-    parted = vertices + table.jaw_at(0.35)
-    places = sampling @ parted
-    alike = likeness(places, places)
-    sampled = np.stack([(sampling @ field).ravel() for field in fields], axis=1)
+    noise = np.asarray(noise, dtype=float)
+    noise = np.broadcast_to(noise[:, None] if noise.ndim == 1 else noise, (len(offsets), 3)).ravel()
+    rows = sampling if still is None else diags((~np.asarray(still)).astype(float)) @ sampling
+    sampled = np.stack([(rows @ field).ravel() for field in fields], axis=1)
     shrink = shrinkage([table.names[k] for k in pick])
     opening, contraction = 0.2, np.full(len(pick), 0.3)
     for _ in range(ROUNDS):
-        unlike = unlikeness(table, fields, opening, contraction)
-        error = sampling @ unlike
-        own = alike * error[:, None] * error[None, :]
-        total = people + np.kron(own, np.eye(3)) + np.diag(still)
-        factor = cho_factor(total, lower=True)
+        others = unlike(table, fields, vertices, jaw, opening, contraction)
+        factor = cho_factor(people + others.covariance(rows) + np.diag(noise**2), lower=True)
         step = max(opening, 0.05)
-        jaw = (sampling @ table.jaw_at(step)).ravel() / step
-        system = solve_triangular(factor[0], np.column_stack([jaw, sampled]), lower=True)
+        by_jaw = (rows @ table.jaw_at(step)).ravel() / step
+        system = solve_triangular(factor[0], np.column_stack([by_jaw, sampled]), lower=True)
         right = solve_triangular(factor[0], y, lower=True)
         system = np.column_stack([system, np.zeros(len(system))])  # the smile has no field but its muscles'
         found, _ = nnls(np.concatenate([system, shrink]), np.concatenate([right, np.zeros(len(shrink))]))
         opening, contraction = float(found[0]), found[1:-1]
     modelled = table.jaw_at(opening) + np.einsum("k,knj->nj", contraction, fields)
-    left = y - jaw * opening - sampled @ contraction
-    weights = cho_solve(factor, left).reshape(-1, 3)
-    across = likeness(parted, places) * unlike[:, None] * error[None, :]
+    left = y - by_jaw * opening - sampled @ contraction
+    beyond = (others.covariance(None, rows) @ cho_solve(factor, left)).reshape(-1, 3)
     muscles = {table.names[k]: float(a) for k, a in zip(pick, contraction, strict=True)}
-    return Expression(opening, muscles, modelled + across @ weights, modelled)
-
-
-def likeness(a, b) -> np.ndarray:
-    """(j, k) correlation between points (j, 3) and (k, 3) mm of what muscles do otherwise."""
-    apart = cdist(a, b, "sqeuclidean")
-    return sum(share * np.exp(-apart / (2 * reach**2)) for reach, share in REACHES)
+    return Expression(opening, muscles, modelled + beyond, modelled)
 
 
 def shrinkage(names) -> np.ndarray:
@@ -112,11 +101,3 @@ def shrinkage(names) -> np.ndarray:
             row[k + 1], row[names.index(name[:-1] + "r") + 1] = 1 / UNEVEN, -1 / UNEVEN
             rows.append(row)
     return np.array(rows)
-
-
-def unlikeness(table: Responses, fields, opening: float, contraction) -> np.ndarray:
-    """(n,) mm, the deviation of what a person's muscles do from what ours do."""
-    moved = (np.linalg.norm(fields, axis=2) * contraction[:, None]) ** 2
-    jaw = np.linalg.norm(table.jaw_at(opening), axis=1) ** 2
-    near = np.clip(table.reach / 6.0, 0, 1)
-    return np.sqrt(UNLIKE**2 * (moved.sum(axis=0) + jaw) + (LEAST * near) ** 2)

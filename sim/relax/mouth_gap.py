@@ -32,11 +32,7 @@ def lip_edges(target: Surface, given, forward, shares):
     out = np.full((len(shares), 2, 3), np.nan)
     if any(name not in given for name in MARKS):
         return out
-    aside = np.abs(shares)[:, None]
-    corner = np.where(shares[:, None] > 0, given["ch_l"], given["ch_r"])
-    upper, lower = (given[name] + aside * (corner - given[name]) for name in ("ls", "li"))
-    lines = upper[:, None] + np.linspace(0, 1, STEPS)[:, None] * (lower - upper)[:, None]
-    depth = depths(target, lines.reshape(-1, 3), forward).reshape(len(shares), STEPS)
+    lines, depth = profiles(target, given, forward, shares)
     for k, (line, behind) in enumerate(zip(lines, depth, strict=True)):
         length = np.linalg.norm(line[-1] - line[0])
         found = first_and_last_edge(behind, int(SPECK / length * STEPS))
@@ -46,6 +42,16 @@ def lip_edges(target: Surface, given, forward, shares):
             way = (line[-1] - line[0]) / length * (1 if side == 0 else -1)
             out[k, side] = line[at] - behind[at] * forward + EATEN * hole * way
     return out
+
+
+def profiles(target: Surface, given, forward, shares):
+    """Lines (k, STEPS, 3) mm from the upper lip to the lower one at ``shares`` (k,), and how deep (k, STEPS) mm the scan lies
+    behind them, see `lip_edges`."""
+    aside = np.abs(shares)[:, None]
+    corner = np.where(shares[:, None] > 0, given["ch_l"], given["ch_r"])
+    upper, lower = (given[name] + aside * (corner - given[name]) for name in ("ls", "li"))
+    lines = upper[:, None] + np.linspace(0, 1, STEPS)[:, None] * (lower - upper)[:, None]
+    return lines, depths(target, lines.reshape(-1, 3), forward).reshape(len(shares), STEPS)
 
 
 def smoothed(edges, shares, at) -> np.ndarray:

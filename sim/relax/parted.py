@@ -106,7 +106,7 @@ def explained(reference: Head, names, marks, goal, rim, edges) -> Expression:
     rows = vstack([landmark_rows(reference.landmarks, names, n), on_rim]).tocsr()
     people = covariance(reference.landmark_positions(), points, still)
     mouth = tuple(f"{name}{side}" for name in MOUTH for side in ("", "_l", "_r"))
-    return explain(responses(), vertices, rows, offsets, people, deviation, mouth)
+    return explain(responses(), vertices, reference.jaw, rows, offsets, people, deviation, mouth)
 
 
 def with_parted_lips(reference: Head, expression: Expression) -> Head:

@@ -23,6 +23,7 @@ from .explain import explain
 from .parted import answers
 from .people import covariance
 from .responses import responses
+from .upper_teeth import TOLD, told_of_stomion
 
 #: Skin that the muscles and jaw move by less holds the face in place, mm; of it, points this far apart are looked at.
 UNMOVED, COARSE = 0.25, 30.0
@@ -44,7 +45,7 @@ class Relaxed:
     report: dict
 
 
-def relaxed(reference: Head, skin, fitted, unseen=None) -> Relaxed:
+def relaxed(reference: Head, skin, fitted, unseen=None, teeth=()) -> Relaxed:
     """The neutral skin of a person.
 
     Parameters
@@ -53,6 +54,7 @@ def relaxed(reference: Head, skin, fitted, unseen=None) -> Relaxed:
     skin (n, 3) mm : the cage of the skin as scanned
     fitted (n,) : 0..1, how far data decided a vertex
     unseen (n,) bool : vertices that are to be left out (None: none)
+    teeth (k, 3) mm : the edge of the upper incisors, where it is seen
     """
     if not answers(reference):
         raise ValueError("the table of responses belongs to another reference head")
@@ -67,13 +69,20 @@ def relaxed(reference: Head, skin, fitted, unseen=None) -> Relaxed:
     rim = np.concatenate([rim, cheeks(rest, start)])
     on_rim = csr_matrix((np.ones(len(rim)), (np.arange(len(rim)), rim)), shape=(len(rim), n))
     sampling = vstack([landmark_rows(reference.landmarks, names, n), on_rim]).tocsr()
-    looked = sampling @ start
-    offsets = (sampling @ now - shift) @ np.linalg.inv(matrix).T - looked
-    weights = np.concatenate([np.zeros(len(looked)), still])
-    people = covariance(reference.landmark_positions(), np.concatenate([looked, start[far]]), weights)
+    back = np.linalg.inv(matrix).T
+    offsets = (sampling @ now - shift) @ back - sampling @ start
+    noise = np.full(offsets.shape, NOISE)
+    meet = told_of_stomion(reference, (np.reshape(teeth, (-1, 3)) - shift) @ back)
+    if meet is not None:
+        sampling = vstack([sampling, landmark_rows(reference.landmarks, ["sto"], n)]).tocsr()
+        offsets, noise = np.concatenate([offsets, meet[None]]), np.concatenate([noise, [TOLD]])
+    known = np.arange(len(offsets)) >= len(names) + len(rim)
+    points = np.concatenate([sampling @ start, start[far]])
+    weights = np.concatenate([np.zeros(len(offsets)), still])
+    people = covariance(reference.landmark_positions(), points, weights)
     people = people[: offsets.size, : offsets.size]
     muscles = [name for name in table.names if not name.startswith(NO_SMILE)]
-    found = explain(table, start, sampling, offsets, people, NOISE, muscles)
+    found = explain(table, start, reference.jaw, sampling, offsets, people, noise, muscles, known)
     out = skin - found.displacement @ matrix.T
     gap = lip_gap(rest, skin)
     out = lips_rounded(rest, lips_closed(rest, out, matrix), matrix)
@@ -83,6 +92,7 @@ def relaxed(reference: Head, skin, fitted, unseen=None) -> Relaxed:
         "jaw_degrees": float(np.degrees(found.jaw * reference.jaw.open_max)),
         "muscles": {name: round(found.muscles[name], 3) for name in strongest if found.muscles[name] >= 0.05},
         "lips_apart_mm": gap,
+        "upper_teeth_seen": meet is not None,
         "moved_max_mm": float(moved.max()),
     }
     return Relaxed(out, found.jaw, report)
