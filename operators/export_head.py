@@ -18,7 +18,11 @@ class HEADSHOP_OT_export_head(Simple, ExportHelper, bpy.types.Operator):
     filter_glob: bpy.props.StringProperty(default="*.glb;*.fbx;*.usdc", options={"HIDDEN"})
     kind: bpy.props.EnumProperty(
         name="Format",
-        items=((".glb", "glTF", "One binary file"), (".fbx", "FBX", ""), (".usdc", "USD", "One binary file")),
+        items=(
+            (".glb", "glTF", "One binary file"),
+            (".fbx", "FBX", "One binary file, for engines that read no glTF"),
+            (".usdc", "USD", "One binary file"),
+        ),
     )
 
     @property

@@ -9,10 +9,10 @@ from ..headshop_addon.jobs import FileJob
 
 UNITS = (
     ("AUTO", "Detect", "Judge by the size of the head"),
-    ("mm", "Millimetres", ""),
-    ("cm", "Centimetres", ""),
-    ("m", "Metres", ""),
-    ("in", "Inches", ""),
+    ("mm", "Millimetres", "Numbers in the file are millimetres"),
+    ("cm", "Centimetres", "Numbers in the file are centimetres"),
+    ("m", "Metres", "Numbers in the file are metres"),
+    ("in", "Inches", "Numbers in the file are inches"),
 )
 UP = (
     ("AUTO", "Detect", "Judge by the shape of the head"),

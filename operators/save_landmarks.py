@@ -9,7 +9,7 @@ from ..headshop_addon.jobs import Simple
 
 
 class HEADSHOP_OT_save_landmarks(Simple, ExportHelper, bpy.types.Operator):
-    """Write the placed landmarks to a file, in the scan file's own axes"""
+    """Write the placed landmarks, and the found ones that are sure enough, to a file, in the scan file's own axes"""
 
     bl_idname = "headshop.save_landmarks"
     bl_label = "Save Landmarks"
@@ -24,7 +24,7 @@ class HEADSHOP_OT_save_landmarks(Simple, ExportHelper, bpy.types.Operator):
         if not polls.library(cls, "scipy") or not polls.scan(cls, context):
             return False
         if not scan_landmarks.to_build(active.scan(context)):
-            cls.poll_message_set("Place landmarks first")
+            cls.poll_message_set("Find or click landmarks first")
             return False
         return True
 

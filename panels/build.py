@@ -27,10 +27,10 @@ class HEADSHOP_PT_build(SidebarPanel, bpy.types.Panel):
         scan, skin = active.scan(context), active.skin(context)
         if scan is None and skin is None:
             hint(layout, context, "A head is built from a scan with landmarks.")
-        elif skin is None and len(scan_landmarks.to_build(scan)) < scan_landmarks.ENOUGH_TO_BUILD:
+        elif scan is not None and len(scan_landmarks.to_build(scan)) < scan_landmarks.ENOUGH_TO_BUILD:
             hint(layout, context, "Find the landmarks of the scan first, or click at least four.")
         elif skin is None:
-            hint(layout, context, "Ready: this takes some seconds.", "CHECKMARK")
+            hint(layout, context, "Ready to build.", "CHECKMARK")
         if skin is not None:
             _result(layout, context, skin)
 

@@ -54,5 +54,5 @@ def test_an_artist_can_go_all_the_way_with_mouse_and_keyboard(blender, blender_g
 
     run("blender", "--command", "extension", "install-file", "-r", "user_default", "-e", str(path), timeout=120)
     script, session = ROOT / "tests" / "gui" / "tour.py", ROOT / "tests" / "gui" / "session.py"
-    said = run("run", "--timeout", "900", "--drive", str(script), "--", "--python", str(session), timeout=960)
+    said = run("run", "--timeout", "1500", "--drive", str(script), "--", "--python", str(session), timeout=1560)
     assert "done" in said

@@ -108,6 +108,19 @@ def asked():
     return landmark_overlay.asked_for
 
 
+def to_correct():
+    """The landmark whose correction is said to help most."""
+    from bl_ext.user_default.headshop.headshop_addon import scan_landmarks
+
+    return next(iter(scan_landmarks.most_useful(bpy.context.scene.headshop.scan)), "")
+
+
+def skin_look():
+    """Names of the materials that the skin shows, and what solid viewports colour by."""
+    shown = [slot.material.name for slot in skin().material_slots]
+    return [*shown, area().spaces.active.shading.color_type]
+
+
 def settled():
     """Whether every face has come to rest where its sliders say."""
     from bl_ext.user_default.headshop.headshop_addon import live

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A tour with mouse and keyboard, as an artist goes: sample, landmarks by clicks, head, slider, expression, bake.
+"""A tour with mouse and keyboard, as an artist goes: sample, landmarks found and clicked, head, slider, expression, bake.
 
 Started by blender-gui once Blender's window is up. Each step asserts; pictures land in ``$HEADSHOP_GUI``.
 """
@@ -14,6 +14,7 @@ from window import ask, choose_tab, click, drag, find, key, point, press, scroll
 
 SCAN = "bpy.context.scene.headshop.scan"
 ORDER = ["prn", "ex_r", "ex_l", "ch_r"]
+TRUTH = {}  # landmark -> world position, of the sample
 
 
 def say(text):
@@ -35,10 +36,48 @@ def add_sample():
     assert len(ask("landmarks('PLACED')")) == 60
     shot("03_sample")
 
+    TRUTH.update(ask("landmarks('PLACED')"))
+
+
+def find_landmarks():
+    """Esc in the middle finds nothing; then all are found, in one step for undo; one is corrected and its like follow."""
+    press("clear_landmarks", across=0.75)
+    assert not ask("landmarks('PLACED', 'DERIVED')")
+    before = ask("counts()")
+    press("find_landmarks")
+    wait_for("job()", 20)
+    shot("04_finding")
+    key("Escape")
+    wait_for("not job()", 20)
+    assert not ask("landmarks('PLACED', 'FOUND', 'DERIVED')") and ask("counts()") == before
+    press("find_landmarks")
+    wait_for("landmarks('FOUND') and not job()", 300)
+    found = ask("landmarks('FOUND')")
+    off = [distance(found[name], TRUTH[name]) for name in found]
+    say(f"{len(off)} found, {sum(off) / len(off):.1f} mm from the truth on average")
+    assert len(off) == 60 and sum(off) / len(off) < 6.0, off
+    point(600, 850)
+    key("ctrl+z")
+    wait_for("not landmarks('FOUND')", 20)
+    key("ctrl+shift+z")
+    wait_for("len(landmarks('FOUND')) == 60", 20)
+    shot("05_found")
+    wrong = ask("to_correct()")
+    press("click_landmarks(start=")
+    wait_for(f"asked() == {wrong!r}", 10)
+    x, y = ask(f"on_screen([{found[wrong]}])")[0]
+    click(x, y - 12)
+    wait_for("len(landmarks('PLACED')) == 1 and not asked()", 20)
+    after = ask("landmarks('FOUND', 'PLACED')")
+    moved = sorted((distance(after[name], found[name]), name) for name in found)
+    assert moved[-1][1] == wrong and moved[-2][0] > 0.5 and moved[0][0] < 0.1 * moved[-1][0], moved
+    assert ask("to_correct()") not in ("", wrong)
+    shot("06_corrected")
+
 
 def click_landmarks():
     """Five clicks on the surface; one is taken back, one skipped; Esc keeps; undo and redo work on the whole."""
-    truth = ask("landmarks('PLACED')")
+    truth = TRUTH
     press("clear_landmarks", across=0.75)
     assert not ask("landmarks('PLACED', 'DERIVED')")
     press("click_landmarks")
@@ -49,8 +88,8 @@ def click_landmarks():
         assert distance(placed[name], truth[name]) < 3.0, (name, placed[name], truth[name])
         assert len(ask("landmarks('DERIVED')")) == (57 if count == 3 else 56 if count == 4 else 0)
         if count == 2:
-            shot("04_two_clicks")
-    shot("05_four_clicks")
+            shot("07_two_clicks")
+    shot("08_four_clicks")
     key("ctrl+z")
     assert sorted(ask("landmarks('PLACED')")) == sorted(ORDER[:3]) and ask("asked()") == ORDER[3]
     click(*ask(f"on_screen([{truth[ORDER[3]]}])")[0])
@@ -67,7 +106,7 @@ def click_landmarks():
     assert count >= 4
     key("Escape")
     assert ask("asked()") == "" and len(ask("landmarks('PLACED')")) == count
-    shot("06_landmarks_kept")
+    shot("09_landmarks_kept")
     key("ctrl+z")
     wait_for("not landmarks('PLACED')", 10)
     key("ctrl+shift+z")
@@ -86,7 +125,7 @@ def build():
     assert ask("counts()") == before and ask("skin()") is None
     press("build_head")
     wait_for("job()", 20)
-    shot("07_building")
+    shot("10_building")
     start = time.monotonic()
     wait_for("skin() is not None and not job()", 400)
     say(f"built in {time.monotonic() - start:.1f} s")
@@ -98,7 +137,18 @@ def build():
     key("ctrl+shift+z")
     wait_for("skin() is not None", 20)
     assert ask("counts()") == after
-    shot("08_built")
+    shot("11_built")
+
+
+def show_fit():
+    """The heat map takes the place of the skin's materials, and they come back."""
+    before = ask("skin_look()")
+    x, y = find("headshop.show_fit", keys="ctrl+shift+c")
+    click(x, y)
+    wait_for("set(skin_look()) == {'Head Shop Fit', 'VERTEX'}", 30)
+    shot("12_fit")
+    click(x, y)
+    wait_for(f"skin_look() == {before!r}", 30)
 
 
 def degrade():
@@ -108,7 +158,7 @@ def degrade():
         x, y = find("bpy.ops.headshop.dress_head(")
         point(x, y + 20)
         time.sleep(2.0)
-        shot("09_repack_tooltip")
+        shot("13_repack_tooltip")
 
 
 def act():
@@ -120,13 +170,13 @@ def act():
     wait_for("moved() > 2.0", 60)
     wait_for("settled()", 120)
     say(f"jaw_open {value:.2f} moves the skin by {ask('moved()'):.1f} mm")
-    shot("10_jaw_open")
+    shot("14_jaw_open")
     key("ctrl+z")
     wait_for("skin().headshop.controls.jaw_open == 0.0 and moved() < 0.01", 30)
     press('set_expression(expression="joy"', across=0.25)
     wait_for("moved() > 2.0", 60)
     wait_for("settled()", 120)
-    shot("11_joy")
+    shot("15_joy")
 
 
 def bake():
@@ -135,7 +185,7 @@ def bake():
     keys = ask("[k.name for k in skin().data.shape_keys.key_blocks]")
     press("bake_expressions")
     wait_for("job().count('Simulating')", 60)
-    shot("12_baking")
+    shot("16_baking")
     key("Escape")
     wait_for("not job()", 60)
     assert ask("[k.name for k in skin().data.shape_keys.key_blocks]") == keys
@@ -146,14 +196,14 @@ def disable():
     ask("bpy.ops.preferences.addon_disable(module='bl_ext.user_default.headshop')")
     assert ask("[name for name in dir(bpy.types) if 'HEADSHOP' in name]") == []
     assert not ask("hasattr(bpy.types.Object, 'headshop')")
-    shot("13_disabled")
+    shot("17_disabled")
 
 
 def main():
     """The whole tour."""
     choose_tab()
     shot("01_start")
-    for step in (add_sample, click_landmarks, build, degrade, act, bake, disable):
+    for step in (add_sample, find_landmarks, click_landmarks, build, show_fit, degrade, act, bake, disable):
         say(step.__doc__)
         step()
     say("done")
