@@ -28,15 +28,16 @@ def contracted(points: np.ndarray, muscles, tensions) -> np.ndarray:
 def sharing(lengths, squares, tensions: np.ndarray) -> np.ndarray:
     """(n,) by how much less than their sum muscles move skin that they pull together.
 
-    "Every muscle has a limit to its length or range of contraction" (4.8) and the thesis leaves open which. Here two
-    equal pulls go as far as the root of 2 of one: the root of the sum of squares over the sum. One muscle alone is not
-    held back, and neither is any by others that hardly reach the same skin.
+    "Every muscle has a limit to its length or range of contraction" (4.8) and the thesis leaves open which. Here skin goes
+    half way, as a geometric mean, between the sum and the root of the sum of squares. One muscle alone is not held back,
+    and neither is any by others that hardly reach the same skin.
 
     lengths, squares : (n, k), sparse or not, mm that each muscle moves the skin by at full contraction, and mm²;
     tensions (k,)
     """
     total = lengths @ tensions
-    return np.where(total > 0, np.sqrt(squares @ tensions**2) / np.where(total > 0, total, 1.0), 1.0)
+    share = np.sqrt(squares @ tensions**2) / np.where(total > 0, total, 1.0)
+    return np.where(total > 0, np.sqrt(share), 1.0)
 
 
 def common_zone(points: np.ndarray, muscles) -> np.ndarray:

@@ -30,6 +30,7 @@ from .sphincter import Sphincter
 
 #: mm over which the skin inside mouth and nostrils keeps the slope of what it hangs on, and follows it at all.
 _STRETCH, _FADE = 15.0, 15.0
+_LIPS = ("orbicularis_oris_upper", "orbicularis_oris_lower")
 #: mm behind its plane that a sphincter still moves.
 _DEEP = 30.0
 
@@ -42,7 +43,7 @@ class Model:
     pulls : sparse (n, k), K A R of the linear muscles; slides : sparse (n, k), K D x of the sheets, mm
     directions : (k, 3) unit vectors of the sheets
     reaches, squares : sparse (n, k), mm that each muscle moves the skin by at full tension, and mm²
-    rings : s times (muscle, `Sphincter`, tie of its centre); squeezes : (s, n) K F
+    rings : s times (muscle, `Sphincter`, tie of its centre, 0 or 1 of the upper or lower lip, else -1); squeezes : (s, n) K F
     lids_at_rest : for each of ``lids`` its vertices (v, 3) mm as `lid_targets` has them open
     hung : (j,) vertices that go with the jaw
     firm : (n,) how far the skin lies on bone; normal : (n, 3) outward, evened out
@@ -57,7 +58,7 @@ class Model:
     directions: np.ndarray
     reaches: sparse.csr_matrix
     squares: sparse.csr_matrix
-    rings: tuple[tuple[int, Sphincter, float], ...]
+    rings: tuple[tuple[int, Sphincter, float, int], ...]
     squeezes: np.ndarray
     firm: np.ndarray
     normal: np.ndarray
@@ -102,7 +103,8 @@ def build_model(head: Head, table: dict | None = None) -> Model:
         reaches[:, k] = influence * far
         tie[k] = {"mandible": 1.0, "skull": 0.0}.get(muscle.origin, share)
         if isinstance(vector, Sphincter):
-            rings.append((k, vector, 0.5 * (base_name(muscle.name) == muscle.name)))
+            lip = _LIPS.index(base) if base in _LIPS else -1
+            rings.append((k, vector, 0.0 if lip < 0 else 0.5, lip))  # the mouth's centre goes half the way of the jaw
             squeezes.append(influence)
         elif isinstance(vector, SheetMuscle):
             slides[:, k] = reaches[:, k]

@@ -51,7 +51,7 @@ def displaced(model: Model, control: Control) -> np.ndarray:
     if not closed:
         skin = skin.copy()
         skin[model.hung] = turned(skin[model.hung], model.layers.jaw[model.hung], rotation, translation, pivot)
-    total = resultant(model, skin, tension, rotation, translation)
+    total = resultant(model, skin, tension, rotation, translation, control.lips)
     normal = model.normal
     if not closed:
         normal = normal + model.layers.mandible[:, None] * (normal @ rotation.T - normal)
@@ -70,18 +70,22 @@ def displaced(model: Model, control: Control) -> np.ndarray:
     return skin
 
 
-def resultant(model: Model, skin: np.ndarray, tension: np.ndarray, rotation, translation) -> np.ndarray:
+def resultant(
+    model: Model, skin: np.ndarray, tension: np.ndarray, rotation, translation, lips=(0.0, 0.0)
+) -> np.ndarray:
     """(n, 3) mm: what the muscles at ``tension`` (k,) do together to the skin (n, 3) that the jaw left (4.8).
 
     Each vector still leads to its own bone: those that arise on the mandible went with it (4.5.3).
+
+    lips : (2,) -1..1, how much less or more the upper and the lower lip pout
     """
     tie = model.tie[:, None]
     heads = model.heads + tie * (model.heads @ rotation.T + translation - model.heads)
     directions = model.directions + tie * (model.directions @ rotation.T - model.directions)
     total = model.pulls @ (tension[:, None] * heads) - (model.pulls @ tension)[:, None] * skin
     total += model.slides @ (tension[:, None] * directions)
-    for (k, ring, tie_of_centre), squeeze in zip(model.rings, model.squeezes, strict=True):
+    for (k, ring, tie_of_centre, lip), squeeze in zip(model.rings, model.squeezes, strict=True):
         if tension[k]:
             centre = ring.centre + tie_of_centre * (rotation @ ring.centre + translation - ring.centre)
-            total += (tension[k] * squeeze)[:, None] * ring.way(skin, centre)
+            total += (tension[k] * squeeze)[:, None] * ring.way(skin, centre, 1.0 if lip < 0 else 1.0 + lips[lip])
     return total * sharing(model.reaches, model.squares, tension)[:, None]

@@ -31,14 +31,14 @@ class Sphincter:
         x, y = ((points - self.centre) @ self.frame[:2].T).T
         return elastic(ellipse(x, y, *self.lengths), self.elasticity)
 
-    def way(self, points: np.ndarray, centre: np.ndarray | None = None) -> np.ndarray:
+    def way(self, points: np.ndarray, centre: np.ndarray | None = None, pouting: float = 1.0) -> np.ndarray:
         """(n, 3) mm from ``points`` (n, 3) to the centre in the plane of the ellipse, and out of it by the pout.
 
-        centre : (3,) mm, where the centre has gone to
+        centre : (3,) mm, where the centre has gone to; pouting : factor on the pout
         """
         centre = self.centre if centre is None else centre
         inside = (centre - points) @ self.frame[:2].T @ self.frame[:2]
-        return inside + self.pout * self.lengths[1] * self.frame[2]
+        return inside + pouting * self.pout * self.lengths[1] * self.frame[2]
 
     def displacement(self, points: np.ndarray, tension: float) -> np.ndarray:
         """(n, 3) mm by which ``points`` (n, 3) move: K T F of the way to the centre, x' = F x and y' = F y."""
