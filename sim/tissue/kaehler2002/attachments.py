@@ -3,7 +3,8 @@
 
 Each vertex finds the muscles under it once, along its inward normal. The topmost takes most of it, the next ones and
 bone the rest, and each hold fades toward the muscle's border, so that neighbours do not part there: the paper's vertices
-have one muscle each. Boneless places hang on an anchor in the flesh that moves with the jaw by the head's own share.
+have one muscle each. Boneless places hang on an anchor in the flesh. Feet go with the mandible by the skin's own share of
+the jaw's motion: 1 on the chin, less where skin slides over the ramus, none on the skull.
 """
 
 import numpy as np
@@ -44,7 +45,7 @@ def build_attachments(head: Head, layers: Layers, fibres: Fibres, parameters: Pa
         weights.append(weight)
     if not holds:
         none = sparse.csr_matrix((n, 0))
-        return Attachments(layers.nodes[2 * n :], none, layers.mandible, layers.soften)
+        return Attachments(layers.nodes[2 * n :], none, layers.jaw, layers.soften)
     part = stacked(np.array(holds), np.array(depths), parameters.opacity)
     total = part.sum(axis=0)
     # bone and muscle are two springs side by side: where bone holds weakly, the foot goes with the muscle
@@ -54,7 +55,7 @@ def build_attachments(head: Head, layers: Layers, fibres: Fibres, parameters: Pa
     offset = layers.nodes[2 * n :] - skin.vertices
     offset = offset + total[:, None] * (-np.maximum(depth, 1.0)[:, None] * normal - offset)
     offset = smoothed(offset, cotangent_stiffness(skin.vertices, triangles), layers.area, 2.0)
-    return Attachments(skin.vertices + offset, moves.tocsr(), layers.mandible, held)
+    return Attachments(skin.vertices + offset, moves.tocsr(), layers.jaw, held)
 
 
 def stacked(holds, depths, opacity: float) -> np.ndarray:

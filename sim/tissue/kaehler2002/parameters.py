@@ -21,9 +21,9 @@ class Parameters:
     #: mm under which the skin feels the bone, at most half of what lies between at rest.
     skull_margin: float = 1.5
     #: muscles: tension per mm² of cross-section and strain; bed per mm² of muscle; what contraction multiplies both by.
-    fibre: float = 60.0
-    bed: float = 1.0
-    active: float = 40.0
+    fibre: float = 250.0
+    bed: float = 0.75
+    active: float = 20.0
     #: mm within which the ends of axes that share a fibre's end merge into one node; farther ones are tied by a spring.
     merge: float = 7.0
     #: mm within which a muscle's end and a sphincter's axis merge.
@@ -31,7 +31,7 @@ class Parameters:
     #: share of a vertex that its topmost muscle takes; the rest is for those under it, then for bone.
     opacity: float = 0.9
     #: mm along its line by which the centre of either half of the orbicularis oris goes forward at full contraction.
-    protrusion: float = 6.0
+    protrusion: float = 8.0
     #: contact of lips, lids and teeth, which the paper leaves out, in multiples of ``skin``; lids held to their turn.
     contact: float = 6.0
     lid: float = 1500.0

@@ -118,7 +118,7 @@ def diagnose(model: Model, pose: Pose, planes: Planes, positions, residual: floa
         "energy": float(energy),
         "volume_drift": float(volume.sum() / rest.sum() - 1),
         "penetration_mm": float(deepest),
-        "bone_penetration_mm": float(-height.min(initial=0.0)),
+        "bone_penetration_mm": float(np.maximum(-height, 0).max(initial=0.0)),
         "inverted_prisms": int((volume <= 0).sum()),
         "peak_mm": float(np.linalg.norm(positions[:n] - model.rest[:n], axis=1).max(initial=0.0)),
     }
