@@ -20,9 +20,10 @@ from .fit_sentence import fit_sentence, fitted_shares, invented
 from .follow import follow
 from .gate import check_against_scan, check_arrangement, check_likeness, check_on_surface
 from .landmarks import require_usable
-from .rest import BONES
+from .rest import BONES, rest_of
 from .scan_surface import scan_surface
 from .skin_fit import SkinFit, fit_skin, group
+from .vestibules import vestibules
 
 REACH = 20.0  # mm: bone deeper under the skin than this is not measured
 POOR = 5.0  # mm: a mean distance in the face above which the fit is refused
@@ -85,7 +86,8 @@ def build_head(
     yield Progress(0.62, "Relaxing the face")
     neutral = neutral_of(fit, relax)
     skin = fit.cage if neutral is None else neutral.skin
-    followed = yield from portion(follow(fit.lips_closed, skin, fit.unseen), 0.63, 0.85)
+    nostrils = vestibules(rest_of(fit.lips_closed), fit.cage, fit.target)
+    followed = yield from portion(follow(fit.lips_closed, skin, fit.unseen, nostrils), 0.63, 0.85)
     yield Progress(0.85, "Checking the anatomy")
     head = followed.head
     scanned = head.skin.vertices + (fit.cage - skin)

@@ -36,7 +36,9 @@ class Followed:
     moved: float
 
 
-def follow(reference: Head, skin: np.ndarray, unseen: np.ndarray | None = None) -> Work:
+def follow(
+    reference: Head, skin: np.ndarray, unseen: np.ndarray | None = None, nostrils: np.ndarray | None = None
+) -> Work:
     """Work returning `Followed`: ``reference`` under another skin.
 
     Parameters
@@ -44,6 +46,7 @@ def follow(reference: Head, skin: np.ndarray, unseen: np.ndarray | None = None) 
     reference : the head that was warped
     skin : (n, 3) mm, its skin after the warp; the linings of mouth, lids and nostrils in it are not looked at
     unseen : (n,) bool, vertices that are to have the reference's own shape (None: none)
+    nostrils : (n, 3) mm, how much farther in than the skin around them has them their linings lie (None: no farther)
     """
     rest = rest_of(reference)
     start = reference.skin.vertices
@@ -77,6 +80,7 @@ def follow(reference: Head, skin: np.ndarray, unseen: np.ndarray | None = None) 
     final = lips_met(rest, final, size)
     for organ in rest.organs:
         final = lined(rest, final, organ, carried.get(organ))
+    final = final if nostrils is None else final + nostrils
     final = lips_met(rest, final, size)
     for eye, side in zip(eyes, "lr", strict=True):
         final = eyeballs.lids_on_eye(rest, final, eye, side)
