@@ -61,13 +61,13 @@ def render_fit(skin: bpy.types.Object, path, limit: float = LIMIT) -> Work:
     return path
 
 
-def drawn_view(vertices, triangles, colours, middle, yaw, width=WIDTH, height=HEIGHT) -> np.ndarray:
+def drawn_view(vertices, triangles, colours, middle, yaw, width=WIDTH, height=HEIGHT, mm=MM) -> np.ndarray:
     """(height, width, 3) of the coloured surface, shaded a little, twice as fine and averaged.
 
     vertices (n, 3) mm along the head's axes, triangles (t, 3), colours (n, 3) sRGB; middle (3,) mm: what the picture is
-    centred on; yaw rad toward the subject's left
+    centred on; yaw rad toward the subject's left; mm that a pixel covers
     """
-    view = Viewpoint.around(middle, yaw, 0.03, 1500.0, MM / 2, width * MM, height * MM)
+    view = Viewpoint.around(middle, yaw, 0.03, 1500.0, mm / 2, width * mm, height * mm)
     seen = depth_map(view, vertices, triangles)
     image = np.empty((view.height, view.width, 3), dtype=np.float32)
     image[:] = PAGE

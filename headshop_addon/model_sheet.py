@@ -24,6 +24,7 @@ from .studio import Model, studio
 WIDTH, HEIGHT = 420, 504  # pixels of one picture
 VIEWS = (("From the front", 4.0), ("From the side", 52.0))  # degrees toward the subject's left
 SHOWN = ("skin", "features")
+NEARER = 1.35  # than a portrait: the face is what is compared
 FAR = 12.0  # mm at the end of the colour scale
 #: sRGB over the share of `FAR` that the skin moves.
 SCALE = np.array([(0.42, 0.42, 0.43), (0.55, 0.50, 0.30), (0.92, 0.62, 0.16), (0.86, 0.22, 0.12), (0.45, 0.03, 0.20)])
@@ -55,6 +56,7 @@ def render_models(skin: bpy.types.Object, path, expression: str = "smile", sampl
             model.show(*SHOWN)
             for number, (view, yaw) in enumerate(VIEWS):
                 aim_camera(scene, frame, yaw, aspect=WIDTH / HEIGHT, close=True)
+                scene.camera.data.lens *= NEARER
                 tiles = []
                 for place, (title, deltas) in enumerate(moved.items()):
                     done = (number + place / len(moved)) / len(VIEWS)
@@ -93,6 +95,6 @@ def _maps(head, moved) -> list:
         place = np.linspace(0, FAR, len(SCALE))
         colours = np.stack([np.interp(far, place, channel) for channel in SCALE.T], axis=1)
         drawn = operator @ ((cage.vertices + deltas["skin"]) @ axes.T)
-        picture = drawn_view(drawn, triangles, colours, middle, 0.0, WIDTH, HEIGHT)
+        picture = drawn_view(drawn, triangles, colours, middle, 0.0, WIDTH, HEIGHT, 0.5 / NEARER)
         tiles.append((Tile(title or "Rest", f"up to {far.max():.1f} mm" if title else "", SHOWN), picture))
     return tiles

@@ -62,3 +62,23 @@ def test_the_command_line_names_the_models(tmp_path, capsys):
     assert main(["render", str(head), "--models", "--fit", "-o", str(tmp_path / "x.png")]) == 2
     assert main(["render", str(head), "--models", "-o", str(tmp_path / "x.mp4")]) == 2
     assert ".png" in capsys.readouterr().err
+
+
+def test_a_sheet_shows_one_expression_by_each_model(bpy, reference, reference_model, tmp_path, monkeypatch):
+    from headshop.headshop_addon import heads, model_sheet
+    from headshop.headshop_addon.pictures import read_picture
+    from headshop.sim.progress import finish
+
+    monkeypatch.setattr("headshop.sim.tissue.model.build_model", lambda head: reference_model)
+    quick = {name: MODELS[name] for name in ("headshop", "waters")}
+    monkeypatch.setattr(model_sheet, "MODELS", quick)
+    monkeypatch.setattr(model_sheet, "WIDTH", 60)
+    monkeypatch.setattr(model_sheet, "HEIGHT", 72)
+    heads.create_head(reference, "Ref")
+    skin = heads.find_heads()[0]
+    with pytest.raises(InputError, match="no expression 'grin'"):
+        finish(model_sheet.render_models(skin, tmp_path / "sheet.png", "grin"))
+    finish(model_sheet.render_models(skin, tmp_path / "sheet.png", "joy", samples=1))
+    page = read_picture(tmp_path / "sheet.png")[..., :3]
+    assert page.shape[1] > 3 * 60 and page.shape[0] > 3 * 72
+    assert skin.data.shape_keys is None, "the head itself is left alone"

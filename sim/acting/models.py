@@ -56,7 +56,7 @@ MODELS = {
     for model in (
         ActingModel("headshop", "Head Shop", "tissue"),
         ActingModel("waters", "Waters 1987", "muscle"),
-        ActingModel("lee", "Lee, Terzopoulos and Waters 1995", "tissue.lee1995"),
+        ActingModel("lee", "Lee et al. 1995", "tissue.lee1995"),
         ActingModel("kaehler", "Kähler et al. 2002", "tissue.kaehler2002"),
     )
 }

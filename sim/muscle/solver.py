@@ -6,8 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..acting.measures import measured
+from ..mesh import vertex_normals
 from ..tissue.arch import arch_contacts
-from ..tissue.contact import eye_planes
+from ..tissue.contact import eye_planes, lip_contacts, sheet_contacts
 from ..tissue.jaw import jaw_transform
 from ..tissue.lids import lid_targets
 from ..tissue.planes import joined, project
@@ -30,8 +31,16 @@ def rest_state(model: Model) -> State:
 
 
 def solve(model: Model, control: Control, state: State | None = None, **_limits) -> Solution:
-    """The pose; ``state`` and limits of iteration are taken for the sake of one interface and change nothing."""
+    """The pose; ``state`` and limits of iteration are taken for the sake of one interface and change nothing.
+
+    Beside `look` lips that got into each other, and outer skin into the lining of the mouth, are moved apart again.
+    """
     skin = displaced(model, control)
+    if np.any(skin != model.skin):
+        triangles = model.contacts.triangles
+        normals, rest = vertex_normals(skin, triangles), vertex_normals(model.skin, triangles)
+        lips = lip_contacts(model.contacts, skin, normals, model.skin, rest)
+        skin = project(joined(sheet_contacts(model.contacts, normals), lips), skin)
     found = measured(model, control, skin)
     return Solution(State(skin), True, 0.0, 1, {"residual": 0.0, **found})
 
