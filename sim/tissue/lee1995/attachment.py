@@ -19,7 +19,7 @@ LIPS = ("orbicularis_oris_upper", "orbicularis_oris_lower")
 #: A muscle whose middle line is longer than its chord by this share is a chain of segments.
 _BENT = 0.04
 _SEGMENTS = 4
-#: What stands beside the belly's half width on either side before Theta_2 is 0, mm: about one mesh of the skin.
+#: How far tendons reach beside the belly until Theta_2 is 0: as far again as it is wide, at most this, mm.
 _BESIDE = 8.0
 #: Shares of a sphincter's force: along its fibres, pursing, protruding (the lips only).
 _LIPS, _EYE = (0.45, 0.35, 1.0), (0.5, 0.5, 0.0)
@@ -62,7 +62,7 @@ def build_attachments(head: Head, layers: Layers, table: dict) -> Attachments:
 def muscle_force(muscle: Muscle, points: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Force of ``muscle`` on fascia at ``points`` (k, 3) with outward ``normals``, of unit size where it is full, and the
     protruding part of it, both (k, 3)."""
-    width = 0.5 * muscle.width + _BESIDE
+    width = 0.5 * muscle.width + min(muscle.width, _BESIDE)
     if muscle.kind == "sphincter":
         return _sphincter(muscle, points, normals, width)
     path = muscle.path[::-1]  # from the free end to the fixed one

@@ -18,6 +18,7 @@ from .calibration import strengths, tangent_stiffness
 from .constants import DEFAULT, Constants
 from .depth import layered
 from .elements import build_elements, build_springs
+from .lining import kept_inside
 from .posing import HELD
 from .puff import puff_forces
 from .stability import stable_step, stiffest
@@ -35,7 +36,7 @@ def build_model(head: Head, constants: Constants = DEFAULT, table: dict | None =
     layers = layered(head)
     n = len(layers.area)
     ties = sheet_ties(head, layers, FLESH)
-    contacts = contact.build_surfaces(head, layers, ties)
+    contacts = kept_inside(head, layers, contact.build_surfaces(head, layers, ties))
     lids = tuple(x for x in (build_lids(head, layers, side) for side in "lr") if x is not None)
     free = layers.free.copy()
     for each in lids:
