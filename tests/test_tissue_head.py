@@ -6,7 +6,8 @@ import pytest
 
 from headshop.sim.acting.expressions import BASIC, expressions, for_head
 from headshop.sim.acting.pose import Pose, control
-from headshop.sim.tissue.lids import eyeball_radius
+from headshop.sim.adapt.shut_eyes import with_shut_eyes
+from headshop.sim.tissue.lids import eyeball_radius, lid_targets
 from headshop.sim.tissue.model import build_model, strengths
 from headshop.sim.tissue.muscle_field import base_name
 from headshop.sim.tissue.posing import posed_parts
@@ -85,6 +86,24 @@ def test_blink_closes_the_eye_and_stays_outside_the_ball(model, reference):
         points = skin[lids.contact_column]
         gap = np.linalg.norm(points - lids.eye.centre, axis=1) - eyeball_radius(lids, points, np.zeros(2))
         assert (gap > np.minimum(lids.clearance, 0) - 0.05).all()
+
+
+def test_eyes_that_were_scanned_shut_can_open(reference):
+    """Their levators open them as far as the reference's, half of it half as far; they are shut at rest."""
+    shut = with_shut_eyes(reference, ("l", "r"))
+    model, marks = build_model(shut), reference.landmark_positions()
+    opened = []
+    for value in (0.0, 0.5, 1.0):
+        asked = control(model, Pose({f"levator_palpebrae_{side}": value for side in "lr"}))
+        skin = shut.skin.vertices.copy()
+        for lids, (upper, lower) in zip(model.lids, asked.lids, strict=True):
+            skin[lids.column] = lid_targets(lids, upper, lower, np.zeros(2))
+        at = shut.landmarks.on({"skin": skin})
+        opened.append([np.linalg.norm(at[f"ps_{side}"] - at[f"pi_{side}"]) for side in "lr"])
+    whole = np.linalg.norm(marks["ps_l"] - marks["pi_l"])
+    assert max(opened[0]) < 1.0
+    assert opened[1] == pytest.approx([whole / 2] * 2, abs=1.0)
+    assert opened[2] == pytest.approx([whole] * 2, abs=1.5)
 
 
 def test_gaze_turns_the_eyes_and_lids_follow(model, reference):
