@@ -4,9 +4,13 @@
 import numpy as np
 import pytest
 
+from headshop.sim.adapt.closest import Surface
+from headshop.sim.adapt.shut_eyes import with_shut_eyes
 from headshop.sim.anatomy.landmark_names import SKIN, mirrored
+from headshop.sim.landmarks.expression import HOLED, holes_in_eyes
 from headshop.sim.landmarks.find import find_landmarks
 from headshop.sim.mesh import Mesh
+from headshop.sim.mesh_subdivision import drawn
 from headshop.sim.progress import finish
 from headshop.sim.scan.individual import draw_field
 
@@ -68,3 +72,12 @@ def test_what_a_damaged_scan_inside_out_does_not_show_is_in_mid_air_and_unsure(p
     seen = min(found.confidence[n] for n in ("prn", "en_l", "en_r", "sn"))
     assert all(found.confidence.get(n, 0.0) < 0.6 * seen for n in hidden)
     assert "op" not in found.sure() and "prn" in found.sure()
+
+
+def test_open_eyes_have_holes_and_shut_ones_none(reference):
+    for sides, holed in (((), True), (("l", "r"), False)):
+        head = with_shut_eyes(reference, sides)
+        seen = (head.groups["inner"] < 0.5)[head.skin.triangles].all(axis=1)
+        target = Surface(drawn(head.skin.faces, head.skin.vertices), head.skin.triangles[seen])
+        found = holes_in_eyes(head.landmark_positions(), np.eye(3), target)
+        assert (found > HOLED) == holed

@@ -5,7 +5,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..adapt.closest import Surface
-from ..relax.mouth_gap import lip_edges
+from ..relax.mouth_gap import depths, lip_edges
 from ..relax.parted import APART
 from .shape_fit import CHANGE, Expression, ShapeFit, fit_shape
 from .shape_space import ShapeSpace
@@ -16,6 +16,10 @@ AROUND_MOUTH = 35.0  # mm
 REASON = 0.95  # shut eyes must fit that much better
 PARTED = 0.97  # and so must parted lips
 LOOKED = np.linspace(-0.28, 0.28, 9)  # shares of the way from the middle of the mouth to its corners
+#: Shares of the way along an eye at which it is looked over, mm above and below, places looked at; mm of a hole, and the
+#: share of lines with one from which on the eyes are open.
+EYE_LINES, ACROSS, LINE = np.linspace(0.25, 0.75, 11), 9.0, 60
+HOLE, HOLED = 1.2, 0.3
 FEW = 25  # percent of them at which lips that are parted may seem closed: noise looks like edges in places only
 
 
@@ -30,7 +34,8 @@ def fit_expression(space: ShapeSpace, target: Surface, fit: ShapeFit):
     moved = fit.coefficients + space.shut["l"] + space.shut["r"]
     rival = yield from _half(fit_shape(space, target, fit.pose, CHANGE, moved, 1, shut), 0.5)
     about = eyes(space)
-    if cost(space, rival, about) < REASON * cost(space, fit, about):
+    holed = holes_in_eyes(space.landmarks(fit.points), fit.matrix, target)
+    if holed < HOLED and cost(space, rival, about) < REASON * cost(space, fit, about):
         return rival, shut
     return fit, Expression(parted)
 
@@ -54,6 +59,26 @@ def lips_parted(space: ShapeSpace, free: ShapeFit, target: Surface) -> bool:
     edges = lip_edges(target, space.landmarks(free.points), forward, LOOKED)
     apart = np.nan_to_num(np.linalg.norm(edges[:, 0] - edges[:, 1], axis=1))
     return bool(np.percentile(apart, FEW) > APART * free.pose.scale)
+
+
+def holes_in_eyes(marks, matrix, target: Surface) -> float:
+    """Share of the lines from above to below both eyes on which the scan has a hole: shut lids are skin, but of an open eye
+    scanners lose the iris and what lies in the lids' shade.
+
+    marks : name -> (3,) mm in the scan; matrix (3, 3) turns and scales the reference into it
+    """
+    heights = np.linspace(ACROSS, -ACROSS, LINE)
+    lines = []
+    for side in "lr":
+        inner, outer = marks[f"en_{side}"], marks[f"ex_{side}"]
+        along = inner + EYE_LINES[:, None] * (outer - inner)
+        lines.append(along[:, None] + heights[:, None] * matrix[:, 2])
+    lines = np.concatenate(lines)
+    forward = -matrix[:, 1] / np.linalg.norm(matrix[:, 1])
+    empty = np.isnan(depths(target, lines.reshape(-1, 3), forward)).reshape(len(lines), LINE)
+    long = int(np.ceil(HOLE / (2 * ACROSS / (LINE - 1))))
+    runs = np.cumsum(np.pad(empty, ((0, 0), (1, 0))), axis=1)
+    return float((runs[:, long:] - runs[:, :-long] == long).any(axis=1).mean())
 
 
 def meeting_lids(space: ShapeSpace, fit: ShapeFit, target: Surface, shut) -> dict[str, np.ndarray]:
