@@ -11,7 +11,7 @@ import numpy as np
 from scipy import sparse
 
 from ...anatomy.head import Head
-from ...mesh import vertex_normals
+from ...mesh import edges, vertex_normals
 from ..geometry import cotangent_stiffness, short_diagonals, smoothed
 from ..muscle_field import theta_2
 from ..structures import Layers
@@ -21,6 +21,8 @@ from .structures import Attachments, Fibres
 #: mm beside a muscle over which its hold on skin fades; mm under the skin (less where only lining is over it); mm
 #: over the skin that a fibre may seem to lie.
 _BESIDE, _DEPTH, _DEPTH_LINING, _ABOVE = 5.0, 14.0, 9.0, 1.0
+#: Times that weights are averaged with those of neighbours.
+_ROUNDS = 2
 #: By how much the jaw's shares of skin and fibre may differ.
 _APART = 0.25
 _LIDS = tuple(f"lid_{k}_{s}" for k in ("upper", "lower") for s in "lr")
@@ -51,6 +53,7 @@ def build_attachments(head: Head, layers: Layers, fibres: Fibres, parameters: Pa
     # bone and muscle are two springs side by side: where bone holds weakly, the foot goes with the muscle
     held = total + (1 - total) * layers.soften
     moves = sum(sparse.diags(part[k] / np.maximum(held, 1e-9)) @ weights[k] for k in range(len(weights)))
+    moves = evened(moves, edges(skin.faces), spare)
     depth = (part * np.array(depths)).sum(axis=0) / np.maximum(total, 1e-9)
     offset = layers.nodes[2 * n :] - skin.vertices
     offset = offset + total[:, None] * (-np.maximum(depth, 1.0)[:, None] * normal - offset)
@@ -69,6 +72,18 @@ def stacked(holds, depths, opacity: float) -> np.ndarray:
     out = np.zeros_like(holds)
     np.put_along_axis(out, order, hold * left, axis=0)
     return out
+
+
+def evened(moves, pairs, spare, rounds: int = _ROUNDS):
+    """Sparse weights (n, k) averaged with those of the neighbours (pairs (e, 2)), so that the end of a narrow muscle does
+    not crease the skin; ``spare`` (n,) 0..1: the share that muscles may take."""
+    n = len(spare)
+    both = np.concatenate([pairs, pairs[:, ::-1]])
+    mean = sparse.csr_matrix((np.ones(len(both)), (both[:, 0], both[:, 1])), (n, n))
+    mean = sparse.diags(0.5 / np.maximum(np.asarray(mean.sum(axis=1)).ravel(), 1)) @ mean + 0.5 * sparse.identity(n)
+    for _ in range(rounds):
+        moves = sparse.diags(spare) @ (mean @ moves)
+    return moves
 
 
 def _hold(vertices, normal, jaw, fibres: Fibres, rows, deepest):

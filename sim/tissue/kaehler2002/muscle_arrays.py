@@ -5,10 +5,11 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ...anatomy.head import Head, Muscle
+from ...errors import InputError
 from ...mesh import vertex_normals
 from ..geometry import short_diagonals
 from ..muscle_field import JAW_MUSCLES, LID_MUSCLES, base_name
-from .calibration import GAINS, USUAL
+from .calibration import GAINS, MOST, USUAL
 from .fibres import arc_lengths
 from .merged import free_ends, interlaced, numbered, shared
 from .parameters import Parameters
@@ -30,8 +31,15 @@ def movers(head: Head, table: dict) -> list[int]:
 
 
 def build_muscles(head: Head, parameters: Parameters, table: dict) -> tuple[Fibres, Axes]:
-    """All muscles that move skin. ``table``: base name -> {"excursion_mm"}, how far the skin goes at contraction 1."""
+    """All muscles that move skin. ``table``: base name -> {"excursion_mm"}, how far the skin goes at contraction 1.
+
+    Raises
+    ------
+    InputError : the head has none.
+    """
     rows = movers(head, table)
+    if not rows:
+        raise InputError("The head has no muscle that moves skin: build it again from its scan.")
     muscles = [head.muscles[k] for k in rows]
     around = _Surroundings(head)
     axes = _build_axes(muscles, rows, around, parameters, table)
@@ -181,7 +189,7 @@ def _shortening(muscles, centre, total, table) -> np.ndarray:
         if muscle.kind == "sphincter":
             radius = np.linalg.norm(muscle.path - centre[k], axis=1)
             length = radius.max() if not muscle.ring else radius.mean()
-        out[k] = min(muscle.max_shortening, way / max(length, 1.0))
+        out[k] = min(MOST * muscle.max_shortening, way / max(length, 1.0))
     return out
 
 
