@@ -221,8 +221,9 @@ def test_relaxation_recovers_from_a_stiffness_told_too_low_and_gives_up_in_words
 
 
 def test_the_topmost_muscle_takes_most_and_bone_what_is_left():
-    share = stacked(np.array([[1.0, 1, 0], [1, 0.5, 0]]), np.array([[5.0, 1, 1], [2, 3, 2]]), 0.8)
-    assert share == pytest.approx(np.array([[0.16, 0.8, 0], [0.8, 0.08, 0]]))
+    share = stacked(np.array([[1.0, 1, 0, 1], [1, 0.5, 0, 1]]), np.array([[5.0, 1, 1, 2], [2, 3, 2, 2]]), 0.8)
+    assert share.sum(axis=0) == pytest.approx([1 - 0.2**2, 1 - 0.2 * 0.6, 0, 1 - 0.2**2])
+    assert share[0] / np.maximum(share[1], 1e-9) == pytest.approx([np.exp(-3), 2 * np.exp(2), 0, 1])
 
 
 def test_turning_keeps_length_and_carrying_goes_by_share():

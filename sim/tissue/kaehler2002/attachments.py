@@ -11,8 +11,9 @@ import numpy as np
 from scipy import sparse
 
 from ...anatomy.head import Head
+from ...anatomy.muscle_room import both_ways
 from ...mesh import edges, vertex_normals
-from ..geometry import cotangent_stiffness, short_diagonals, smoothed
+from ..geometry import cotangent_stiffness, smoothed
 from ..muscle_field import theta_2
 from ..structures import Layers
 from .parameters import Parameters
@@ -21,22 +22,28 @@ from .structures import Attachments, Fibres
 #: mm beside a muscle over which its hold on skin fades; mm under the skin (less where only lining is over it); mm
 #: over the skin that a fibre may seem to lie.
 _BESIDE, _DEPTH, _DEPTH_LINING, _ABOVE = 5.0, 14.0, 9.0, 1.0
+#: mm deeper by which a muscle has e times less of the skin.
+_OVER = 1.0
 #: Times that weights are averaged with those of neighbours.
 _ROUNDS = 2
 #: By how much the jaw's shares of skin and fibre may differ.
 _APART = 0.25
+_MOUTH = ("mouth_bag", "lip_upper", "lip_lower")
 _LIDS = tuple(f"lid_{k}_{s}" for k in ("upper", "lower") for s in "lr")
 
 
 def build_attachments(head: Head, layers: Layers, fibres: Fibres, parameters: Parameters) -> Attachments:
     """The feet of all skin vertices of ``head``."""
     skin, n = head.skin, len(layers.area)
-    triangles = short_diagonals(skin.vertices, skin.faces)
+    triangles = both_ways(skin.faces)  # so that both halves of a symmetric face are alike
     normal = vertex_normals(skin.vertices, triangles)
     zero = np.zeros(n)
-    group = {k: np.asarray(head.groups.get(k, zero), float) for k in ("inner", "mouth_bag", *_LIDS)}
+    group = {k: np.asarray(head.groups.get(k, zero), float) for k in ("inner", *_MOUTH, *_LIDS)}
     lid = np.clip(np.max([group[k] for k in _LIDS], axis=0), 0, 1)
-    spare = np.clip(1 - lid, 0, 1) ** 2 * ((group["inner"] - group["mouth_bag"]) < 0.5) * layers.free[:n]
+    mouth = np.max(
+        [group[k] for k in _MOUTH], axis=0
+    )  # the lining of lips hangs on them, that of nose and lids does not
+    spare = np.clip(1 - lid, 0, 1) ** 2 * (group["inner"] - mouth < 0.5) * layers.free[:n]
     deepest = np.where(group["inner"] > 0.5, _DEPTH_LINING, _DEPTH)
     holds, depths, weights = [], [], []
     for k in range(int(fibres.muscle.max(initial=-1)) + 1):
@@ -55,23 +62,23 @@ def build_attachments(head: Head, layers: Layers, fibres: Fibres, parameters: Pa
     moves = sum(sparse.diags(part[k] / np.maximum(held, 1e-9)) @ weights[k] for k in range(len(weights)))
     moves = evened(moves, edges(skin.faces), spare)
     depth = (part * np.array(depths)).sum(axis=0) / np.maximum(total, 1e-9)
-    offset = layers.nodes[2 * n :] - skin.vertices
+    # straight inward: where bone lies to both sides alike, under the chin, the nearest point of it is a matter of chance
+    offset = -np.linalg.norm(layers.nodes[2 * n :] - skin.vertices, axis=1)[:, None] * normal
     offset = offset + total[:, None] * (-np.maximum(depth, 1.0)[:, None] * normal - offset)
-    offset = smoothed(offset, cotangent_stiffness(skin.vertices, triangles), layers.area, 2.0)
+    offset = smoothed(offset, 0.5 * cotangent_stiffness(skin.vertices, triangles), layers.area, 2.0)
     return Attachments(skin.vertices + offset, moves.tocsr(), layers.jaw, held)
 
 
 def stacked(holds, depths, opacity: float) -> np.ndarray:
-    """(m, n) share of each vertex that each muscle takes: from the skin down, each takes ``opacity`` of what is left.
+    """(m, n) share of each vertex that each muscle takes; together 1 - product of (1 - opacity * hold), bone the rest.
 
-    holds (m, n) 0..1 over the muscle; depths (m, n) mm under the skin.
+    Among themselves they share by their hold, and for each `_OVER` mm that one lies deeper e times less: the topmost
+    takes most, and two of one depth (at the midline, left and right) the same. holds (m, n) 0..1; depths (m, n) mm.
     """
-    order = np.argsort(depths, axis=0, kind="stable")
-    hold = opacity * np.take_along_axis(holds, order, axis=0)
-    left = np.cumprod(np.concatenate([np.ones((1, hold.shape[1])), 1 - hold[:-1]]), axis=0)
-    out = np.zeros_like(holds)
-    np.put_along_axis(out, order, hold * left, axis=0)
-    return out
+    together = 1 - np.prod(1 - opacity * holds, axis=0)
+    top = np.where(holds > 0, depths, np.inf).min(axis=0, initial=np.inf)
+    part = holds * np.exp(-np.maximum(depths - np.where(np.isfinite(top), top, 0.0), 0) / _OVER)
+    return together * part / np.maximum(part.sum(axis=0), 1e-12)
 
 
 def evened(moves, pairs, spare, rounds: int = _ROUNDS):
@@ -103,7 +110,9 @@ def _hold(vertices, normal, jaw, fibres: Fibres, rows, deepest):
     across = _spacing(points, fibre)
     under = np.clip((deep + _ABOVE) / _ABOVE, 0, 1) * np.clip(2 - 2 * deep / deepest[near, None], 0, 1)
     # a lip hangs on its own half of the mouth's muscle, though the other one's fibres may lie under it
-    apart = np.abs(jaw[near, None] - fibres.share[rows][inside])
+    share = fibres.share[rows]
+    share = share[inside] + t * (share[inside + 1] - share[inside])
+    apart = np.abs(jaw[near, None] - share)
     under = under * np.clip(2 - apart / _APART, 0, 1)
     hold = theta_2(np.maximum(side - 0.5 * across, 0) / _BESIDE) * under
     weight = hold * np.exp(-((side / max(0.6 * across, 1.5)) ** 2))

@@ -23,7 +23,8 @@ class DivergedError(ArithmeticError):
     """Positions left the finite numbers: the time step is too long for the stiffness, or the head is degenerate."""
 
 
-def _require_finite(values, what: str) -> None:
+def require_finite(values, what: str) -> None:
+    """Raise `DivergedError` unless all ``values`` (k, 3) are finite numbers."""
     if not np.isfinite(values).all():
         raise DivergedError(
             f"The {what} of the tissue left the finite numbers in {int((~np.isfinite(values)).any(axis=1).sum())} nodes: "
@@ -45,8 +46,8 @@ def advance(force: Callable, x, v, mass, dt: float, damping: float = 0.0, steps:
             x = x + dt * v
             pull = force(x, (k + 1) / steps) * inverse
             v = keep * (v + 0.5 * dt * pull)
-    _require_finite(x, "positions")
-    _require_finite(v, "velocities")
+    require_finite(x, "positions")
+    require_finite(v, "velocities")
     return x, v
 
 
@@ -81,7 +82,7 @@ def relax(force: Callable, x, stiffness, tolerance: float, max_steps: int, refre
             size = float(np.sqrt(np.einsum("ij,ij->i", ahead, ahead).max(initial=0.0)))
         if not np.isfinite(size) or size > _AWAY * max(least, 0.1):
             if doubled == _DOUBLINGS:
-                _require_finite(ahead, "forces")
+                require_finite(ahead, "forces")
                 raise DivergedError(
                     f"The tissue does not come to rest: after {step} steps it still moves by {size:.3g} mm."
                 )

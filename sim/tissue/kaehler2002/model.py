@@ -4,6 +4,7 @@
 import numpy as np
 
 from ...anatomy.head import JAW_PARTS, Head
+from ...mesh import vertex_normals
 from ..contact import build_surfaces
 from ..geometry import short_diagonals
 from ..layers import build_layers, sheet_ties
@@ -29,14 +30,15 @@ def build_model(head: Head, parameters: Parameters = DEFAULT, table: dict | None
     layers = build_layers(head, LAYERS)
     n = len(layers.area)
     skin = head.skin.vertices
+    triangles = short_diagonals(skin, head.skin.faces)
     free = layers.free[:n]
     fibres, axes = build_muscles(head, parameters, table)
     attachments = build_attachments(head, layers, fibres, parameters)
     ties = sheet_ties(head, layers)
     rest = np.concatenate([skin, attachments.foot, mirrored(skin, attachments.foot)])
-    prisms, volume = build_prisms(rest, short_diagonals(skin, head.skin.faces), free)
+    prisms, volume = build_prisms(rest, triangles, free)
     springs = build_skin_mesh(head.skin.faces, skin, attachments, layers, ties, parameters)
-    skull = build_skull(layers, parameters.skull_margin, parameters.skull_area)
+    skull = build_skull(layers, vertex_normals(skin, triangles), parameters.skull_margin, parameters.skull_area)
     lids = tuple(x for x in (build_lids(head, layers, side) for side in "lr") if x is not None)
     about = about_nodes(springs, n)
     about[skull.node] += 2 * skull.stiffness

@@ -5,9 +5,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ...anatomy.head import Head, Muscle
+from ...anatomy.muscle_room import both_ways
 from ...errors import InputError
 from ...mesh import vertex_normals
-from ..geometry import short_diagonals
 from ..muscle_field import JAW_MUSCLES, LID_MUSCLES, base_name
 from .calibration import GAINS, MOST, USUAL
 from .fibres import arc_lengths
@@ -52,7 +52,7 @@ class _Surroundings:
     def __init__(self, head: Head):
         v = head.skin.vertices
         zero = np.zeros(len(v))
-        self.normals = vertex_normals(v, short_diagonals(v, head.skin.faces))
+        self.normals = vertex_normals(v, both_ways(head.skin.faces))
         self.jaw = np.asarray(head.groups.get("jaw", zero), float)
         self.seen = np.asarray(head.groups.get("inner", zero)) < 0.5
         self.lips = [np.asarray(head.groups.get(name, zero)) > 0.3 for name in _LIP]

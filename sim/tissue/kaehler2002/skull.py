@@ -13,12 +13,15 @@ from ..structures import Layers
 from .structures import Skull
 
 _HARD = 8.0
+#: Cosine between skin and the bone under it below which the bone lies beside it, not under it.
+_LEVEL = 0.7
 
 
-def build_skull(layers: Layers, margin: float, stiffness_area: float) -> Skull:
-    """The planes under the bony columns that move."""
+def build_skull(layers: Layers, normals, margin: float, stiffness_area: float) -> Skull:
+    """The planes under the bony columns that move; ``normals`` (n, 3) of the skin, which must lie about level over them."""
     n = len(layers.area)
-    node = np.flatnonzero(layers.bony & layers.free[:n])
+    level = np.einsum("ij,ij->i", layers.bone_normal, normals) > _LEVEL
+    node = np.flatnonzero(layers.bony & layers.free[:n] & level)
     point, normal = layers.nodes[2 * n :][node], layers.bone_normal[node]
     height = np.einsum("ij,ij->i", layers.nodes[:n][node] - point, normal)
     return Skull(

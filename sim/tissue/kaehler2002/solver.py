@@ -11,7 +11,7 @@ from ..lids import eyeball_radius
 from ..planes import Planes, depths, project
 from ..structures import Control, Solution, State
 from .forces import contact_stiffness, energy_gradient, find_contacts, stiffness_at
-from .leapfrog import advance, relax, stable_step
+from .leapfrog import advance, relax, require_finite, stable_step
 from .posed import Pose, pose_of
 from .skull import heights
 from .structures import Model
@@ -41,6 +41,7 @@ def solve(
     DivergedError : positions left the finite numbers.
     """
     pose = pose_of(model, control)
+    require_finite(pose.nodes, "attachments")
     n = model.count
     free = np.flatnonzero(model.free)
     before = rest_state(model) if state is None else state
@@ -73,6 +74,7 @@ def solve(
 def step(model: Model, state: State, control: Control, dt: float) -> State:
     """The state ``dt`` seconds later: m a = forces - gamma m v, in as many leapfrog steps as stability asks for."""
     pose = pose_of(model, control)
+    require_finite(pose.nodes, "attachments")
     n, p = model.count, model.parameters
     free = np.flatnonzero(model.free)
     x = state.positions.copy()
