@@ -17,6 +17,7 @@ from ..mesh import cross_sides, vertex_normals
 from ..triangle_projection import Triangles
 from .cover import Cover
 from .merging import clustered, weld
+from .ranking import Ranking, least
 
 FIRST = 8  # nearest samples of a point that are looked at before it is known how many more must be
 BATCH = 20_000  # points looked at together
@@ -40,18 +41,10 @@ class Contacts:
     border: np.ndarray
 
 
-def least(row, cost):
-    """The rows (r,) that occur in ``row`` (k,), ascending, and where the first of the least ``cost`` (k,) of each is.
-
-    ``row`` must be in ascending order.
-    """
-    if len(row) == 0:
-        return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
-    start = np.flatnonzero(np.concatenate([[True], row[1:] != row[:-1]]))
-    lowest = np.minimum.reduceat(cost, start)
-    is_least = np.flatnonzero(cost == np.repeat(lowest, np.diff(np.append(start, len(row)))))
-    first = is_least[np.concatenate([[True], row[is_least][1:] != row[is_least][:-1]])]
-    return row[first], first
+def mixed(planes, corners, weights):
+    """(k, 3) sums of columns of ``planes`` (3, n) at ``corners`` (k, 3) by ``weights`` (k, 3)."""
+    a, b, c = (planes.take(corners[:, k], axis=1) * weights[:, k] for k in range(3))
+    return (a + b + c).T
 
 
 class Surface:
@@ -66,8 +59,8 @@ class Surface:
     def __init__(self, vertices, triangles, smooth: float = 0.0):
         self.vertices, self.triangles = weld(np.asarray(vertices, dtype=float), np.asarray(triangles))
         self._smooth = smooth
-        planes = self.vertices.T.copy()
-        cross = cross_sides(*(planes.take(self.triangles[:, k], axis=1) for k in range(3)))
+        self._planes = self.vertices.T.copy()
+        cross = cross_sides(*(self._planes.take(self.triangles[:, k], axis=1) for k in range(3)))
         self._double = np.sqrt(cross[0] ** 2 + cross[1] ** 2 + cross[2] ** 2)
         self.face_normals = (cross / self._double).T
 
@@ -84,11 +77,11 @@ class Surface:
         return self.vertices[self.triangles]
 
     @cached_property
-    def _solid(self) -> Triangles:
+    def solid(self) -> Triangles:
         return Triangles(self.corners)
 
     @cached_property
-    def _cover(self) -> Cover:
+    def cover(self) -> Cover:
         return Cover(self.corners, self.area)
 
     @cached_property
@@ -145,14 +138,19 @@ class Surface:
             normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
         return normals
 
+    @cached_property
+    def _normal_planes(self):
+        return np.ascontiguousarray(self.normals.T)
+
     def turned(self) -> "Surface":
         """The same surface with its outside inside (for scans wound the wrong way round)."""
         out = object.__new__(Surface)
         kept = (
             "vertices",
+            "_planes",
             "_smooth",
             "_double",
-            "_cover",
+            "cover",
             "_boxes",
             "_sides",
             "edge_length",
@@ -180,7 +178,11 @@ class Surface:
             cell *= 1.05 * np.sqrt(len(out.triangles) / most)
         return out
 
-    def _contacts(self, count, found, distance, triangle, weights) -> Contacts:
+    def smooth_normals(self, triangle, weights) -> np.ndarray:
+        """(k, 3) at places with barycentric ``weights`` (k, 3) on triangles (k,), about as long as one."""
+        return mixed(self._normal_planes, self.triangles[triangle], weights)
+
+    def contacts(self, count, found, distance, triangle, weights) -> Contacts:
         """Spread what was found (indices ``found``) over ``count`` queries."""
         ok = np.zeros(count, dtype=bool)
         ok[found] = True
@@ -195,8 +197,8 @@ class Surface:
         )
         corner = self.triangles[triangle]
         full.distance[found], full.triangle[found], full.weights[found] = distance, triangle, weights
-        full.points[found] = np.einsum("kij,ki->kj", self.vertices[corner], weights)
-        normal = np.einsum("kij,ki->kj", self.normals[corner], weights)
+        full.points[found] = mixed(self._planes, corner, weights)
+        normal = self.smooth_normals(triangle, weights)
         full.normals[found] = normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
         full.border[found] = (self.border_vertex[corner] & (weights > 1e-6)).any(axis=1)
         return full
@@ -205,28 +207,28 @@ class Surface:
         """The closest point of the surface for each of ``points`` (k, 3), if nearer than ``reach`` mm."""
         points = np.asarray(points, dtype=float).reshape(-1, 3)
         if len(points) == 0:
-            return self._contacts(0, np.zeros(0, int), np.zeros(0), np.zeros(0, int), np.zeros((0, 3)))
+            return self.contacts(0, np.zeros(0, int), np.zeros(0), np.zeros(0, int), np.zeros((0, 3)))
         best = np.full(len(points), np.inf)
         triangle, weights = np.full(len(points), -1), np.zeros((len(points), 3))
 
         def improve(row, owner):
             """Let the pairs of query and triangle compete."""
-            w, d = self._solid.closest(points, row, owner)
+            w, d = self.solid.closest(points, row, owner)
             at, pick = least(row, d)
             better = d[pick] < best[at]
             at, pick = at[better], pick[better]
             best[at], triangle[at], weights[at] = d[pick], owner[pick], w[pick]
 
         # The triangle of the nearest sample bounds the distance; only boxes nearer than that can hold a nearer one.
-        far, sample = self._cover.nearest(points, 1, reach)
+        far, sample = self.cover.nearest(points, 1, reach)
         near = np.flatnonzero(np.isfinite(far[:, 0]))
-        improve(near, self._cover.owner[sample[near, 0]])
+        improve(near, self.cover.owner[sample[near, 0]])
         for start in range(0, len(near), BATCH):
             at = near[start : start + BATCH]
             row, owner = self._boxes.near(points[at], best[at] * (1 + 1e-12))
             improve(at[row], owner)
         found = np.flatnonzero(best <= reach)
-        return self._contacts(len(points), found, best[found], triangle[found], weights[found])
+        return self.contacts(len(points), found, best[found], triangle[found], weights[found])
 
     def _once(self, row, owner):
         """Each pair of a point and a triangle once, in order."""
@@ -237,10 +239,10 @@ class Surface:
 
     def facing(self, points, reach: float) -> np.ndarray:
         """(k, 3) about the normal of what is near each of ``points`` (k, 3), zero where nothing is within ``reach`` mm."""
-        far, sample = self._cover.nearest(points, 1, reach)
+        far, sample = self.cover.nearest(points, 1, reach)
         found = np.isfinite(far[:, 0])
         out = np.zeros((len(points), 3))
-        out[found] = self.face_normals[self._cover.owner[sample[found, 0]]]
+        out[found] = self.face_normals[self.cover.owner[sample[found, 0]]]
         return out
 
     def ranked(
@@ -252,36 +254,25 @@ class Surface:
         (k, 3) by at least ``agreement`` (cosine) compete by distance x (1 + bend (1 - cosine)).
         """
         points = np.asarray(points, dtype=float).reshape(-1, 3)
-        best = np.full(len(points), np.inf)
-        triangle, weights, distance = np.full(len(points), -1), np.zeros((len(points), 3)), np.full(len(points), np.inf)
+        ranking, cover = Ranking(self, points, normals, reach, agreement, bend), self.cover
 
         def improve(row, owner, far):
-            # What costs no less than the best so far even if it faced the same way needs no look.
-            some = np.flatnonzero(far - cover.radius[owner] < best[row])
+            some = np.flatnonzero(far - cover.radius[owner] < ranking.cost[row])
             row, owner = self._once(row[some], owner[some])
-            w, d = self._solid.closest(points, row, owner)
-            normal = np.einsum("kij,ki->kj", self.normals[self.triangles[owner]], w)
-            cosine = np.einsum("ij,ij->i", normal, normals[row])
-            cosine /= np.maximum(np.sqrt(np.einsum("ij,ij->i", normal, normal)), 1e-12)
-            cost = np.where((cosine >= agreement) & (d <= reach), d * (1 + bend * (1 - cosine)), np.inf)
-            at, pick = least(row, cost)
-            better = cost[pick] < best[at]
-            at, pick = at[better], pick[better]
-            best[at], triangle[at], weights[at], distance[at] = cost[pick], owner[pick], w[pick], d[pick]
+            ranking.improve(row, owner, np.zeros(len(row)))
 
-        first, cover = min(FIRST, near), self._cover
+        first = min(FIRST, near)
         far, sample = cover.nearest(points, first, reach)
         for columns in (slice(0, 2), slice(2, first)):
             row, column = np.nonzero(np.isfinite(far[:, columns]))
             improve(row, cover.owner[sample[:, columns][row, column]], far[:, columns][row, column])
-        doubt = np.flatnonzero((far[:, -1] - cover.most < best) & np.isfinite(far[:, -1]))
+        doubt = np.flatnonzero((far[:, -1] - cover.most < ranking.cost) & np.isfinite(far[:, -1]))
         if near > first and len(doubt):
             seen = far[doubt, -1:]
             far, sample = cover.nearest(points[doubt], near, reach)
             row, column = np.nonzero(np.isfinite(far) & (far >= seen))
             improve(doubt[row], cover.owner[sample[row, column]], far[row, column])
-        at = np.flatnonzero(triangle >= 0)
-        return self._contacts(len(points), at, distance[at], triangle[at], weights[at])
+        return ranking.contacts()
 
     def crossings(self, origins, directions, reach: float):
         """All crossings of the lines ``origin + t direction``, -reach <= t <= reach, with the surface.

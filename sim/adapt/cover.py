@@ -10,18 +10,20 @@ SAMPLES = 160_000  # a finer cover does not pay for the time its tree takes
 MANY = 1000  # points from which on all cores search
 FEW = 30_000  # triangles; finer than they are where there are no more: less to try for each query
 
+USUAL = 90  # per cent of the triangles that are no larger than usual
+
 
 class Cover:
     """Samples of triangles (m, 3, 3) mm of areas (m,) mm², and how far from its samples a triangle may reach.
 
     owner (s,) : the triangle of each sample; radius (m,) mm : no point of a triangle is farther from the nearest of its
-    samples; most : the largest of these
+    samples; most : the largest of these; usual : nearly the largest, large triangles left out
     """
 
     def __init__(self, corners: np.ndarray, area: np.ndarray):
         usual = max(float(np.median(np.sqrt(2 * area))), 1e-6)
         samples, self.owner, self.radius = spread(corners, usual * (0.55 if len(corners) < FEW else 0.75))
-        self.most = float(self.radius.max())
+        self.most, self.usual = float(self.radius.max()), float(np.percentile(self.radius, USUAL))
         self._tree = cKDTree(samples)
 
     def nearest(self, points, count, reach):
@@ -32,7 +34,7 @@ class Cover:
         count = min(count, self._tree.n)
         cores = -1 if len(points) >= MANY else 1
         far, sample = self._tree.query(points, k=count, distance_upper_bound=reach + self.most, workers=cores)
-        return far.reshape(len(points), -1), sample.reshape(len(points), -1)
+        return far.reshape(len(points), count), sample.reshape(len(points), count)
 
     def within(self, points, reach):
         """Pairs of a point and a sample no farther than ``reach`` mm from it: (p,), (p,) and their distance (p,) mm."""

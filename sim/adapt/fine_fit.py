@@ -7,15 +7,16 @@ outliers, and solves for the displacement that is closest to the data across the
 (bending energy, the discrete bi-Laplacian), more softly in each round.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.sparse import csr_matrix, diags, vstack
+from scipy.sparse import csr_matrix, vstack
 
-from ..mesh import edges, vertex_normals
+from ..mesh import cross_sides, vertex_normals
 from .closest import Surface
-from .drawn_points import drawn_points
-from .smooth_system import laplacian, solve_displacement
+from .drawn_points import DrawnPoints, drawn_points
+from .smooth_system import Smoothness, solve_displacement
+from .tracked import Tracked
 
 #: One round each: stiffness of bending, reach in mm, width in mm of what counts as an outlier.
 SCHEDULE = (
@@ -31,11 +32,9 @@ SCHEDULE = (
 ALONG = 0.02  # weight of a pull along the surface against one across it
 AGREE = 0.6  # cosine between the normals of skin and scan
 WHOLE = 150.0  # mm²: a piece of data smaller than this is trusted in proportion
-FINEST = 4.0  # most by which fine parts of the mesh are stiffened
 FINE = 0.2  # stiffness below which data in between the cage's vertices is looked for too
 LAST = 0.02  # stiffness below which rims look for data
 CLOSE = 1.5  # mm: how far they look
-STRETCH = 0.002  # weight of first differences, which keeps the mesh from sliding where bending is free
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,15 +61,16 @@ class Fitted:
     distance: np.ndarray
 
 
-def matches(points, normals, target: Surface, reach: float):
-    """Where on the scan ``points`` (k, 3) of the skin belong, and how far to trust it.
+def matches(rows, points, normals, tracked: Tracked, reach: float):
+    """Where on the scan the points number ``rows`` (k,) of the skin, now at ``points`` (k, 3), belong, and how far to
+    trust it.
 
     Returns the `Contacts` and trust (k,) 0..1.
     """
-    found = target.ranked(points, normals, reach, AGREE, near=32)
+    found = tracked.ranked(rows, points, normals, reach, AGREE)
     agree = np.einsum("ij,ij->i", found.normals, normals)
     trust = np.where(found.found & ~found.border, np.clip((agree - AGREE) / (1 - AGREE) * 1.5, 0.05, 1), 0)
-    trust *= np.clip(target.piece_area[np.maximum(found.triangle, 0)] / WHOLE, 0, 1)
+    trust *= np.clip(tracked.target.piece_area[np.maximum(found.triangle, 0)] / WHOLE, 0, 1)
     return found, trust
 
 
@@ -87,85 +87,64 @@ def fine_fit(cage, faces, free, rim, target: Surface, anchors: Anchors, stiffnes
     """
     base = np.array(cage, dtype=float)
     n = len(base)
-    stiffness = np.ones(n) if stiffness is None else np.array(stiffness, dtype=float)
-    bend = laplacian(base, faces)
-    stiffness = stiffness * fineness(base, faces)
+    smooth = Smoothness(base, faces, np.ones(n) if stiffness is None else stiffness)
     surface = drawn_points(faces, free, free | rim)
-    held = (anchors.sampling @ surface.rows[:n]).tocsr()
-    start = surface.rows @ base
-    displacement = np.zeros((n, 3))
-    for turn, (soft, reach, width) in enumerate(rounds):
-        now = surface.rows @ (base + displacement)
-        normal = vertex_normals(now, surface.outer)
-        look = np.flatnonzero(surface.seen if soft < LAST else surface.look if soft < FINE else surface.coarse)
-        points = surface.between(now)[look]
-        found, trust = matches(points, normal[look], target, reach)
-        trust[~surface.look[look] & (found.distance > CLOSE)] = 0
-        use = np.flatnonzero(trust > 0)
-        gap = found.points[use] - points[use]
-        # The direction of the data's normal decides; a pinch of the skin's own keeps it calm on rough data.
-        facing = found.normals[use] + 0.5 * normal[look[use]]
-        facing /= np.linalg.norm(facing, axis=1, keepdims=True)
-        height = np.einsum("ij,ij->i", gap, facing)
-        robust = trust[use] / (1 + (height / width) ** 2) ** 2
-        blocks = robust[:, None, None] * (facing[:, :, None] * facing[:, None, :] + ALONG * np.eye(3))
-        rows = surface.rows[look[use]]
-        goal = rows @ displacement + gap
-        hold = anchors.weight[:, None, None] * np.eye(3)
-        want = anchors.target - held @ base
-        sampling = vstack([rows, held]).tocsr()
-        blocks = np.concatenate([blocks, hold])
-        goal = np.concatenate([goal, want])
-        pulls = np.einsum("kij,kj->ki", blocks, goal)
-        smooth = (bend.T @ diags(soft * stiffness) @ bend + STRETCH * stretch(bend, stiffness)).tocsr()
-        displacement = solve_displacement(smooth, sampling, blocks, pulls, displacement)
-        worse = folded(start, surface.rows @ (base + displacement), surface.triangles)
-        if worse.any():  # hold the surroundings of a fold more stiffly from now on
-            at = np.zeros(len(start))
-            at[surface.triangles[worse].ravel()] = 1
-            near = (surface.rows.T @ at > 0.2).astype(float)
-            for _ in range(2):
-                near = np.maximum(near, (np.abs(bend) @ near > 0) * 0.9)
-            stiffness = stiffness * np.where(near > 0, 6.0, 1.0)
+    anchors = replace(anchors, sampling=(anchors.sampling @ surface.rows[:n]).tocsr())
+    tracked = Tracked(target, surface.rows.shape[0])
+    moved = np.zeros((n, 3))
+    for turn, step in enumerate(rounds):
+        moved = nearer(base, moved, surface, tracked, anchors, smooth, step)
         yield (turn + 1) / len(rounds)
-    cage = base + displacement
+    cage = base + moved
     now = surface.rows @ cage
     vertices = now[:n]
     normal = vertex_normals(now, surface.outer)[:n]
-    found, trust = matches(vertices, normal, target, 3.0)
+    found, trust = matches(np.arange(n), vertices, normal, tracked, 3.0)
     trust[~free] = 0
     gap = np.einsum("ij,ij->i", vertices - found.points, found.normals)
     return Fitted(cage, vertices, np.clip(trust, 0, 1), np.where(free & (trust > 0), gap, np.nan))
 
 
-def fineness(vertices, faces) -> np.ndarray:
-    """(n,) factor on the stiffness: the same bend costs as much in a fine mesh as in a coarse one.
+def nearer(base, moved, surface: DrawnPoints, tracked: Tracked, anchors: Anchors, smooth: Smoothness, step):
+    """One round, from the displacement ``moved`` (n, 3) of ``base`` (n, 3), of which ``surface`` is made, to the next.
 
-    A Laplacian without units sees a bend over short edges as small; small features would be the first to fold.
+    step : of the schedule. Surroundings of folds are made stiffer in ``smooth``.
     """
-    a, b = edges(faces).T
-    length = np.linalg.norm(vertices[a] - vertices[b], axis=1)
-    n = len(vertices)
-    count = np.bincount(a, minlength=n) + np.bincount(b, minlength=n)
-    mean = (np.bincount(a, length, n) + np.bincount(b, length, n)) / np.maximum(count, 1)
-    usual = np.median(mean[count > 0])
-    return np.clip((usual / np.maximum(mean, 1e-6)) ** 2, 1.0, FINEST)
-
-
-def stretch(bend, stiffness):
-    """Energy (n, n) of first differences, symmetric, from the Laplacian's own neighbours."""
-    link = -(bend - diags(bend.diagonal()))
-    link = link.maximum(link.T)
-    total = np.asarray(link.sum(axis=1)).ravel()
-    return diags(total) - link
+    soft, reach, width = step
+    now = surface.rows @ (base + moved)
+    normal = vertex_normals(now, surface.outer)
+    look = np.flatnonzero(surface.seen if soft < LAST else surface.look if soft < FINE else surface.coarse)
+    points = surface.between(now)[look]
+    found, trust = matches(look, points, normal[look], tracked, reach)
+    trust[~surface.look[look] & (found.distance > CLOSE)] = 0
+    use = np.flatnonzero(trust > 0)
+    gap = found.points[use] - points[use]
+    # The direction of the data's normal decides; a pinch of the skin's own keeps it calm on rough data.
+    facing = found.normals[use] + 0.5 * normal[look[use]]
+    facing /= np.linalg.norm(facing, axis=1, keepdims=True)
+    height = np.einsum("ij,ij->i", gap, facing)
+    robust = trust[use] / (1 + (height / width) ** 2) ** 2
+    rows, k = surface.rows[look[use]], len(anchors.weight)
+    # A point is pulled along the normal, and a little along the surface; an anchor every way.
+    facing, along = np.concatenate([facing, np.zeros((k, 3))]), np.append(np.full(len(use), ALONG), np.ones(k))
+    weight = np.concatenate([robust, anchors.weight])
+    goal = np.concatenate([rows @ moved + gap, anchors.target - anchors.sampling @ base])
+    pulls = facing * np.einsum("ij,ij->i", facing, goal)[:, None] + along[:, None] * goal
+    sampling = vstack([rows, anchors.sampling]).tocsr()
+    pulls *= weight[:, None]
+    moved = solve_displacement(smooth.matrix(soft), sampling, weight, facing, along, pulls, moved)
+    worse = folded(surface.rows @ base, surface.rows @ (base + moved), surface.triangles)
+    if worse.any():
+        at = np.zeros(len(now))
+        at[surface.triangles[worse].ravel()] = 1
+        smooth.stiffen(surface.rows.T @ at > 0.2)
+    return moved
 
 
 def folded(before, after, triangles, limit: float = 0.0):
     """Which triangles (t,) turned over: their normal against what it was is below ``limit`` (cosine)."""
-
-    def unit(points):
-        a, b, c = (points[triangles[:, k]] for k in range(3))
-        normal = np.cross(b - a, c - a)
-        return normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
-
-    return np.einsum("ij,ij->i", unit(before), unit(after)) < limit
+    one, other = (cross_sides(*(p.T.take(triangles[:, k], axis=1) for k in range(3))) for p in (before, after))
+    along = (one * other).sum(axis=0)
+    if limit:
+        along -= limit * np.sqrt((one**2).sum(axis=0) * (other**2).sum(axis=0))
+    return along < 0

@@ -2,10 +2,15 @@
 """The regulariser of the last stage: how a displacement over a mesh is kept smooth, and the linear system it makes."""
 
 import numpy as np
-from scipy.sparse import bsr_matrix, coo_matrix, csr_matrix, diags, identity
+from scipy.sparse import coo_matrix, csr_matrix, diags, identity
 from scipy.sparse.linalg import splu
 
 from ..mesh import edges
+
+FINEST = 4.0  # most by which fine parts of the mesh are stiffened
+STRETCH = 0.002  # weight of first differences, which keeps the mesh from sliding where bending is free
+CLOSE = 1e-7  # energy of what is left, against that of the pulls, at which the system counts as solved
+FOLDED = 6.0  # factor on the stiffness around a fold
 
 
 def laplacian(vertices, faces) -> csr_matrix:
@@ -23,6 +28,56 @@ def laplacian(vertices, faces) -> csr_matrix:
     return (identity(n) - diags(1 / np.where(total > 0, total, 1)) @ link).tocsr()
 
 
+def fineness(vertices, faces) -> np.ndarray:
+    """(n,) factor on the stiffness: the same bend costs as much in a fine mesh as in a coarse one.
+
+    A Laplacian without units sees a bend over short edges as small; small features would be the first to fold.
+    """
+    a, b = edges(faces).T
+    length = np.linalg.norm(vertices[a] - vertices[b], axis=1)
+    n = len(vertices)
+    count = np.bincount(a, minlength=n) + np.bincount(b, minlength=n)
+    mean = (np.bincount(a, length, n) + np.bincount(b, length, n)) / np.maximum(count, 1)
+    usual = np.median(mean[count > 0])
+    return np.clip((usual / np.maximum(mean, 1e-6)) ** 2, 1.0, FINEST)
+
+
+def stretch(bend):
+    """Energy (n, n) of first differences, symmetric, from the neighbours in the Laplacian ``bend`` (n, n)."""
+    link = -(bend - diags(bend.diagonal()))
+    link = link.maximum(link.T)
+    total = np.asarray(link.sum(axis=1)).ravel()
+    return diags(total) - link
+
+
+class Smoothness:
+    """The energy ``u^T matrix u`` of a displacement over a mesh, with parts that are stiffer than others.
+
+    vertices (n, 3) mm, faces (m, 3 or 4); stiffness (n,) : factor on the energy of bending
+    """
+
+    def __init__(self, vertices, faces, stiffness):
+        self._bend = laplacian(vertices, faces)
+        self._stiffness = np.asarray(stiffness, dtype=float) * fineness(vertices, faces)
+        self._calm = (STRETCH * stretch(self._bend)).tocsr()
+        self._weigh()
+
+    def _weigh(self):
+        self._bending = (self._bend.T @ diags(self._stiffness) @ self._bend).tocsr()
+
+    def matrix(self, soft: float) -> csr_matrix:
+        """(n, n) with the energy of bending times ``soft``."""
+        return soft * self._bending + self._calm
+
+    def stiffen(self, at) -> None:
+        """Make the surroundings of the vertices ``at`` (n,) bool stiffer: they folded."""
+        near = np.asarray(at, dtype=float)
+        for _ in range(2):
+            near = np.maximum(near, (np.abs(self._bend) @ near > 0) * 0.9)
+        self._stiffness = self._stiffness * np.where(near > 0, FOLDED, 1.0)
+        self._weigh()
+
+
 def factorised(matrix):
     """Solver of a symmetric positive definite sparse system."""
     return splu(
@@ -33,46 +88,42 @@ def factorised(matrix):
     ).solve
 
 
-def solve_displacement(smooth, sampling, blocks, pulls, start):
+def solve_displacement(smooth, sampling, weight, normals, along, pulls, start):
     """The displacement (n, 3) that minimises ``u^T smooth u + sum_s (S u - g)_s^T W_s (S u - g)_s``.
 
-    smooth (n, n) the same for x, y, z; sampling S (s, n); blocks W (s, 3, 3); pulls W g (s, 3), mm; start (n, 3) a
-    first guess. Solved by conjugate gradients, preconditioned with the factorised system whose blocks are all
-    isotropic: a few steps, and each axis alone in the factor.
+    smooth (n, n) the same for x, y, z; sampling S (s, n); W_s = weight (normal normal^T + along 1) of weight (s,),
+    normals (s, 3), zero for a point that is pulled alike every way, and along (s,); pulls W g (s, 3), mm; start (n, 3) a
+    first guess. Solved by conjugate gradients, preconditioned with the factorised system whose W are all isotropic: a
+    few steps, and each axis alone in the factor.
     """
     n = sampling.shape[1]
-    count = len(blocks)
-    if count:
-        middle = bsr_matrix((blocks, np.arange(count), np.arange(count + 1)), shape=(3 * count, 3 * count))
-        across = sampling.T.tocsr()
-        right = (sampling.T @ pulls).ravel()
-        # Between the pull along normals (full) and along the surface (weak): their geometric mean preconditions both.
-        trace = np.einsum("kii->k", blocks) / 3
-        rough = smooth + sampling.T @ diags(trace) @ sampling
-    else:
-        right, rough = np.zeros(3 * n), smooth
+    across = sampling.T.tocsr()
+    right = across @ pulls
+    # Between the pull along normals (full) and along the surface (weak): their mean preconditions both.
+    trace = weight * ((normals**2).sum(axis=1) / 3 + along)
+    rough = smooth + across @ diags(trace) @ sampling
     precondition = factorised(rough + 1e-9 * identity(n))
+    normals, flat = normals * np.sqrt(weight)[:, None], (weight * along)[:, None]
 
     def apply(x):
-        x = x.reshape(n, 3)
-        out = smooth @ x
-        if count:
-            out += across @ (middle @ (sampling @ x).ravel()).reshape(-1, 3)
-        return out.ravel()
+        at = sampling @ x
+        pull = flat * at
+        pull += normals * np.einsum("ij,ij->i", normals, at)[:, None]
+        return smooth @ x + across @ pull
 
-    x = start.ravel().copy()
+    x = np.array(start, dtype=float)
     r = right - apply(x)
-    z = precondition(r.reshape(n, 3)).ravel()
-    p, rz = z.copy(), float(r @ z)
-    goal = 1e-7 * max(float(right @ precondition(right.reshape(n, 3)).ravel()), 1e-12)
+    z = precondition(r)
+    p, rz = z, float(np.vdot(r, z))
+    goal = CLOSE * max(float(np.vdot(right, precondition(right))), 1e-12)
     for _ in range(60):
         if rz <= goal:
             break
         q = apply(p)
-        step = rz / float(p @ q)
+        step = rz / float(np.vdot(p, q))
         x += step * p
         r -= step * q
-        z = precondition(r.reshape(n, 3)).ravel()
-        rz, before = float(r @ z), rz
+        z = precondition(r)
+        rz, before = float(np.vdot(r, z)), rz
         p = z + (rz / before) * p
-    return x.reshape(n, 3)
+    return x
