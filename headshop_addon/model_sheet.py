@@ -22,15 +22,15 @@ from .stage import aim_camera
 from .studio import Model, studio
 
 WIDTH, HEIGHT = 420, 504  # pixels of one picture
-VIEWS = (("From the front", 4.0), ("From the side", 52.0))  # degrees toward the subject's left
+VIEWS = (("From the front", 4.0), ("From the side", 40.0))  # degrees toward the subject's left
 SHOWN = ("skin", "features")
-NEARER = 1.35  # than a portrait: the face is what is compared
+NEARER = 1.25  # than a portrait: the face is what is compared
 FAR = 12.0  # mm at the end of the colour scale
 #: sRGB over the share of `FAR` that the skin moves.
 SCALE = np.array([(0.42, 0.42, 0.43), (0.55, 0.50, 0.30), (0.92, 0.62, 0.16), (0.86, 0.22, 0.12), (0.45, 0.03, 0.20)])
 
 
-def render_models(skin: bpy.types.Object, path, expression: str = "smile", samples: int = 16) -> Work:
+def render_models(skin: bpy.types.Object, path, expression: str = "smile", samples: int = 8) -> Work:
     """Render the sheet into a PNG file; returns its path.
 
     expression : a name of the table of expressions
