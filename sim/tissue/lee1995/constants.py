@@ -31,7 +31,7 @@ class Constants:
     muscle_layer: float = 10.0
 
     volume: float = 1.0
-    shape: float = 15.0
+    shape: float = 20.0
     restoration: float = 5.0
     biphasic_strain: float = 0.3
 

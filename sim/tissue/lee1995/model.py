@@ -40,8 +40,9 @@ def build_model(head: Head, constants: Constants = DEFAULT, table: dict | None =
     lids = tuple(x for x in (build_lids(head, layers, side) for side in "lr") if x is not None)
     free = layers.free.copy()
     for each in lids:
-        held = each.column[each.hold > HELD]
-        free[held] = free[held + n] = False
+        held = each.hold > HELD
+        free[each.column[held]] = False
+        free[each.column[held & each.upper] + n] = False  # under the lower lid fascia gives way to a raised cheek
     layers = replace(layers, free=free)
     triangles = short_diagonals(head.skin.vertices, head.skin.faces)
     moving = np.concatenate([free, np.zeros(n, bool)])
