@@ -19,6 +19,8 @@ from .volume import prism_volumes
 
 #: Leapfrog steps for one iteration of a caller who counts in iterations of an implicit solver.
 _STEPS = 8
+#: Times that skin is taken out of what it may still be in, by contacts found anew.
+_PASSES = 3
 #: Steps after which contacts are looked for again.
 _REFRESH = frozenset((1, 10, 25, 45, 70, 100, 140, 190, 250, 330, 430, 560, 730, 950, 1200))
 
@@ -65,8 +67,9 @@ def solve(
     about = (stiffness_at(model, x) + contact_stiffness(model, held["planes"]))[free]
     skin, residual, steps = relax(force, x[free], about, tolerance, _STEPS * max_iterations, refresh)
     x[free] = skin
-    planes = _visible(find_contacts(model, pose, x[:n]), n)
-    x = project(planes, x)
+    for _ in range(_PASSES):
+        planes = find_contacts(model, pose, x[:n])
+        x = project(planes, x, rounds=4)
     result = State(x, np.zeros_like(x))
     return Solution(result, residual <= tolerance, residual, steps, diagnose(model, pose, planes, x, residual))
 
@@ -94,11 +97,6 @@ def step(model: Model, state: State, control: Control, dt: float) -> State:
     velocities = np.zeros_like(x)
     velocities[free] = v
     return State(x, velocities)
-
-
-def _visible(planes: Planes, n: int) -> Planes:
-    keep = (planes.node < n) & (planes.partner < n)
-    return Planes(planes.node[keep], planes.normal[keep], planes.level[keep], planes.partner[keep])
 
 
 def diagnose(model: Model, pose: Pose, planes: Planes, positions, residual: float) -> dict:
