@@ -45,11 +45,12 @@ def barriers(model: LeeModel, pose: Pose, positions: np.ndarray) -> Barriers:
     normals = vertex_normals(skin, model.triangles)
     flesh = contact.sheet_contacts(model.contacts, normals)
     lips = contact.lip_contacts(model.contacts, skin, normals, model.layers.nodes[:n], model.rest_normals)
-    return _near(bone, positions), _near(joined(flesh, lips, *eyes, teeth), positions)
+    free = np.concatenate([model.layers.free, np.zeros(n + 1, bool)])  # the last one: no partner
+    return _near(bone, positions, free), _near(joined(flesh, lips, *eyes, teeth), positions, free)
 
 
-def _near(planes, positions):
-    keep = heights(planes, positions) < _REACH
+def _near(planes, positions, free):
+    keep = (heights(planes, positions) < _REACH) & (free[planes.node] | free[planes.partner])
     return Planes(planes.node[keep], planes.normal[keep], planes.level[keep], planes.partner[keep])
 
 
