@@ -87,7 +87,7 @@ def follow(
 
     yield Progress(0.45, "Untangle the skin")
     lining = np.maximum(group(reference, "lip_upper"), group(reference, "lip_lower")) > 0.3
-    shut = rest.rim & lining  # where lips meet is seen, a fold behind them is not
+    shut = (rest.rim | seen) & lining  # lips and where they meet are seen, a fold behind them is not
     final = restored(rest, final, unseen, scale)
     final = yield from portion(untangling(rest, final, seen & ~unseen, shut), 0.45, 0.55)
     final = lips_parted(rest, final, size)

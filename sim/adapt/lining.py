@@ -9,6 +9,7 @@ import numpy as np
 from scipy.sparse import diags
 
 from ..mesh_piercing import self_piercings
+from ..mesh_subdivision import drawn
 from .rest import MEET, Rest
 from .smooth_system import factorised
 from .thin_plate_spline import similarity
@@ -81,19 +82,23 @@ def lips_parted(rest: Rest, skin, matrix) -> np.ndarray:
     """Skin (n, 3) whose lips do not cross each other, moved apart by as little as that takes where they do.
 
     Lips lie a tenth of a millimetre apart at their corners, so a smooth warp's twist is enough to cross them. ``matrix``
-    (3, 3) turns and scales the reference into the skin's place; what is drawn crosses less than its cage, and follows.
+    (3, 3) turns and scales the reference into the skin's place. Where only the cage crosses itself, what nobody sees
+    gives way, the margins and what lies behind them; the red of the lips only if the surface drawn crosses itself too.
     """
-    triangles = rest.head.skin.triangles
+    faces, triangles = rest.head.skin.faces, rest.head.skin.triangles
     upper, lower = (np.asarray(rest.head.groups[name], dtype=float) for name in ("lip_upper", "lip_lower"))
-    lips = np.flatnonzero(np.maximum(upper, lower)[triangles].max(axis=1) > 0.3)
-    up = matrix @ [0.0, 0.0, 1.0]
+    lips = triangles[np.maximum(upper, lower)[triangles].max(axis=1) > 0.3]
+    way = PART * np.sign(upper - lower)[:, None] * (matrix @ [0.0, 0.0, 1.0])
     out = np.array(skin, dtype=float)
-    for _ in range(PARTINGS):
-        pairs = self_piercings(out, triangles[lips])
-        if len(pairs) == 0:
+    for gives in ((rest.inner | rest.rim).astype(float), np.ones(len(out))):
+        out = np.array(skin, dtype=float)
+        for _ in range(PARTINGS):
+            pairs = self_piercings(out, lips)
+            if len(pairs) == 0:
+                break
+            crossed = np.zeros(len(out))
+            crossed[lips[pairs.ravel()].ravel()] = 1.0
+            out += (np.maximum(crossed, 0.5 * (rest.link @ crossed > 0)) * gives)[:, None] * way
+        if len(self_piercings(drawn(faces, out), lips)) == 0:
             break
-        crossed = np.zeros(len(out))
-        crossed[triangles[lips][pairs.ravel()].ravel()] = 1.0
-        near = np.maximum(crossed, 0.5 * (rest.link @ crossed > 0))
-        out += PART * (near * np.sign(upper - lower))[:, None] * up
     return out
