@@ -20,6 +20,7 @@ from ..mesh_unfolding import unfolded
 from .eyeball import reach
 from .head import Eye, Head
 
+TURNS = 4  # of smoothing and unfolding, one after the other
 SHUT = 1.5  # mm: lids whose margins are nowhere farther apart are shut
 
 
@@ -46,9 +47,13 @@ def seen_skin(head: Head) -> Mesh:
             if gap.max() > SHUT:
                 vertices[inside] = on_eyeball(vertices, quads[film], inside, eye)
     mesh = Mesh(vertices, quads)
-    open_ = unfolded(vertices, mesh.triangles)
-    free = smoothed_free(open_, mesh.triangles)
-    return mesh.moved(open_ if free is open_ else unfolded(free, mesh.triangles))
+    out = unfolded(vertices, mesh.triangles)
+    for _ in range(TURNS):  # what is smoothed may fold, and what is unfolded may pierce itself
+        free = smoothed_free(out, mesh.triangles)
+        if free is out:
+            break
+        out = unfolded(free, mesh.triangles)
+    return mesh.moved(smoothed_free(out, mesh.triangles))
 
 
 def on_eyeball(vertices, quads, inside, eye: Eye) -> np.ndarray:
