@@ -7,7 +7,7 @@ from ..mesh import vertex_normals
 from ..tissue import contact
 from ..tissue.arch import arch_contacts
 from ..tissue.jaw import jaw_transform
-from ..tissue.lids import eyeball_radius
+from ..tissue.lids import depth_in_eyeballs
 from ..tissue.planes import depths, joined
 from ..tissue.structures import Control
 from ..tissue.volume import prism_volumes
@@ -40,11 +40,7 @@ def measured(model, control: Control, skin: np.ndarray) -> dict[str, float]:
         contact.sheet_contacts(model.contacts, normals),
         contact.lip_contacts(model.contacts, skin, normals, rest, vertex_normals(rest, every)),
     )
-    deepest = depths(planes, skin).max(initial=0.0)
-    for lids in model.lids:
-        points, gaze = skin[lids.contact_column], control.gaze_of(lids.side)
-        gap = np.linalg.norm(points - lids.eye.centre, axis=1) - eyeball_radius(lids, points, gaze)
-        deepest = max(deepest, float((np.minimum(lids.clearance, 0) - gap).max(initial=0.0)))
+    deepest = max(depths(planes, skin).max(initial=0.0), depth_in_eyeballs(model.lids, skin, control.gaze_of))
     return {
         "volume_drift": float(after / before - 1) if before > 0 else 0.0,
         "penetration_mm": float(deepest),

@@ -4,7 +4,7 @@
 import numpy as np
 
 from . import contact
-from .lids import eyeball_radius
+from .lids import depth_in_eyeballs
 from .planes import depths
 from .structures import Model
 from .volume import prism_volumes
@@ -19,12 +19,7 @@ def diagnose(model: Model, pose, positions, planes, energy, residual) -> dict:
     fascia = positions[n : 2 * n]
     bone = contact.bone_planes(model.contacts.bones, model.layers, fascia, pose.rotation, pose.translation)
     moved = np.linalg.norm(positions[:n] - model.layers.nodes[:n], axis=1)
-    eye = 0.0
-    for lids in model.lids:
-        column = lids.contact_column
-        gap = np.linalg.norm(positions[column] - lids.eye.centre, axis=1)
-        gap -= eyeball_radius(lids, positions[column], pose.gaze["lr".index(lids.side)]) + np.minimum(lids.clearance, 0)
-        eye = max(eye, -float(gap.min(initial=0.0)))
+    eye = depth_in_eyeballs(model.lids, positions, pose.gaze_of)
     return {
         "residual": float(residual),
         "energy": float(energy),

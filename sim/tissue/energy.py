@@ -45,6 +45,10 @@ class Pose:
     gaze: np.ndarray
     seal: float
 
+    def gaze_of(self, side: str) -> np.ndarray:
+        """(2,) rad, of the eye on ``side`` ("l" or "r")."""
+        return self.gaze["lr".index(side)]
+
 
 def posed_reference(model: Model, rotation, translation) -> np.ndarray:
     """(3 n, 3) mm: every node moved by its share with the mandible."""
@@ -198,7 +202,7 @@ def find_contacts(model: Model, pose: Pose, positions) -> Planes:
         model.cache["rest_normals"] = vertex_normals(rest, triangles)
     return joined(
         contact.bone_planes(model.contacts.bones, model.layers, positions[n : 2 * n], pose.rotation, pose.translation),
-        *(contact.eye_planes(lids, skin, pose.gaze["lr".index(lids.side)]) for lids in model.lids),
+        *(contact.eye_planes(lids, skin, pose.gaze_of(lids.side)) for lids in model.lids),
         arch.arch_contacts(model.contacts, skin, pose.rotation, pose.translation),
         contact.sheet_contacts(model.contacts, normals),
         contact.lip_contacts(model.contacts, skin, normals, rest, model.cache["rest_normals"]),

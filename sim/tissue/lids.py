@@ -195,6 +195,19 @@ def eyeball_radius(lids: Lids, points: np.ndarray, gaze: np.ndarray) -> np.ndarr
     return np.interp(angle, lids.profile_angle, lids.profile)
 
 
+def depth_in_eyeballs(lids_of_both, skin: np.ndarray, gaze_of) -> float:
+    """mm by which skin (n, 3) reaches deepest into an eyeball, beyond what it does at rest; 0 where it does not.
+
+    lids_of_both : a model's `Lids`; gaze_of(side) -> (2,) rad
+    """
+    deepest = 0.0
+    for lids in lids_of_both:
+        points = skin[lids.contact_column]
+        gap = np.linalg.norm(points - lids.eye.centre, axis=1) - eyeball_radius(lids, points, gaze_of(lids.side))
+        deepest = max(deepest, float((np.minimum(lids.clearance, 0) - gap).max(initial=0.0)))
+    return deepest
+
+
 def lid_targets(lids: Lids, upper: float, lower: float, gaze: np.ndarray) -> np.ndarray:
     """(v, 3) mm: where the lid vertices want to be. upper, lower: 0 rest, 1 closed, negative wider.
 

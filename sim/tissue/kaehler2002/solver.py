@@ -7,7 +7,7 @@ to muscle is left out, as in the paper. In `step` the feet go to where the contr
 
 import numpy as np
 
-from ..lids import eyeball_radius
+from ..lids import depth_in_eyeballs
 from ..planes import Planes, depths, project
 from ..structures import Control, Solution, State
 from .forces import contact_stiffness, energy_gradient, find_contacts, stiffness_at
@@ -106,12 +106,8 @@ def diagnose(model: Model, pose: Pose, planes: Planes, positions, residual: floa
     volume = prism_volumes(positions, model.prisms) if len(model.prisms) else np.ones(1)
     rest = model.prism_volume if len(model.prisms) else np.ones(1)
     energy, _ = energy_gradient(model, pose, planes, positions)
-    deepest = depths(planes, positions).max(initial=0.0)
-    for lids in model.lids:
-        column = lids.contact_column
-        gap = np.linalg.norm(positions[column] - lids.eye.centre, axis=1)
-        gap -= eyeball_radius(lids, positions[column], pose.gaze["lr".index(lids.side)]) + np.minimum(lids.clearance, 0)
-        deepest = max(deepest, -float(gap.min(initial=0.0)))
+    eye = depth_in_eyeballs(model.lids, positions, lambda side: pose.gaze["lr".index(side)])
+    deepest = max(depths(planes, positions).max(initial=0.0), eye)
     height, _ = heights(positions, model.skull, pose.rotation, pose.translation)
     return {
         "residual": float(residual),

@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from ..lids import eyeball_radius
+from ..lids import depth_in_eyeballs
 from ..planes import depths
 from ..volume import prism_volumes
 from .motion import barriers
@@ -21,12 +21,7 @@ def diagnose(model: LeeModel, pose: Pose, state: LeeState, residual: float) -> d
     volume = prism_volumes(x, model.elements.prisms) if len(model.elements.prisms) else np.ones(1)
     before = model.elements.volume if len(model.elements.prisms) else np.ones(1)
     bone, others = barriers(model, pose, x)
-    eye = 0.0
-    for lids in model.lids:
-        column = lids.contact_column
-        gap = np.linalg.norm(x[column] - lids.eye.centre, axis=1)
-        gap -= eyeball_radius(lids, x[column], pose.gaze["lr".index(lids.side)]) + np.minimum(lids.clearance, 0)
-        eye = max(eye, -float(gap.min(initial=0.0)))
+    eye = depth_in_eyeballs(model.lids, skin, lambda side: pose.gaze["lr".index(side)])
     return {
         "residual": float(residual),
         "speed": float(np.sqrt((state.velocities**2).sum(axis=1).max(initial=0.0))),
