@@ -8,6 +8,7 @@ import sys
 import tempfile
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 _SETTINGS = pytest.StashKey[str]()
@@ -121,3 +122,40 @@ def reference_model(reference):
     from headshop.sim.tissue.model import build_model
 
     return build_model(reference)
+
+
+def _grid(count, width, height):
+    from headshop.sim.mesh import Mesh
+
+    x, y = np.meshgrid(*[np.linspace(-width / 2, width / 2, count)] * 2, indexing="ij")
+    i = np.arange(count**2).reshape(count, count)
+    faces = np.stack([i[:-1, :-1], i[1:, :-1], i[1:, 1:], i[:-1, 1:]], axis=-1).reshape(-1, 4)
+    return Mesh(np.stack([x.ravel(), y.ravel(), np.full(x.size, height)], axis=1), faces.astype(np.int32))
+
+
+@pytest.fixture(scope="session")
+def flat_patch():
+    """Function of vertices a side and width (mm): a flat patch of skin, 8 mm over flat bone, with one muscle."""
+    from headshop.sim.anatomy.head import PARTS, SKIN_GROUPS, Eye, Head, Jaw, Muscle, SurfacePoints
+    from headshop.sim.mesh import Mesh
+
+    def made(count, width):
+        skin = _grid(count, width, 0.0)
+        far = Mesh.from_triangles(np.array([[500.0, 500, 0], [510, 500, 0], [500, 510, 0]]), [[0, 1, 2]])
+        groups = {name: np.zeros(len(skin.vertices), np.float32) for name in SKIN_GROUPS}
+        groups["face"] = (np.abs(skin.vertices[:, :2]).max(axis=1) < width / 2 - 1).astype(np.float32)
+        fibre = np.linspace([-25.0, 0, -6], [20, 0, -4], 6)
+        fibres = np.stack([fibre + [0, y, 0] for y in (-3, 0, 3)])
+        points = SurfacePoints((), (), np.zeros((0, 3), int), np.zeros((0, 3)))
+        return Head(
+            parts={**dict.fromkeys(PARTS, far), "skin": skin, "skull": _grid(17, 120.0, -8.0)},
+            groups=groups,
+            landmarks=points,
+            skull_landmarks=points,
+            feature_mesh=np.zeros((0, 3), int),
+            muscles=(Muscle("zygomaticus_major_l", "linear", fibres, 9.0, 2.0, 0.35, "skull", "soft", far),),
+            jaw=Jaw(np.array([50.0, 0, -60]), np.array([-50.0, 0, -60]), np.array([0, -80.0, -90])),
+            eyes=(Eye(np.array([500.0, 0, 0]), 12.0, np.array([0, -1.0, 0])),) * 2,
+        )
+
+    return made

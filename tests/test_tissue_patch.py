@@ -5,8 +5,6 @@ import numpy as np
 import pytest
 
 from headshop.sim.acting.pose import Pose, control
-from headshop.sim.anatomy.head import PARTS, SKIN_GROUPS, Eye, Head, Jaw, Muscle, SurfacePoints
-from headshop.sim.mesh import Mesh
 from headshop.sim.tissue import contact, planes
 from headshop.sim.tissue.energy import energy_gradient, find_contacts, pose_of
 from headshop.sim.tissue.model import build_model
@@ -16,33 +14,9 @@ NAME = "zygomaticus_major_l"
 TABLE = {"zygomaticus_major": {"excursion_mm": 8.0}}
 
 
-def _grid(count, width, height):
-    x, y = np.meshgrid(*[np.linspace(-width / 2, width / 2, count)] * 2, indexing="ij")
-    i = np.arange(count**2).reshape(count, count)
-    faces = np.stack([i[:-1, :-1], i[1:, :-1], i[1:, 1:], i[:-1, 1:]], axis=-1).reshape(-1, 4)
-    return Mesh(np.stack([x.ravel(), y.ravel(), np.full(x.size, height)], axis=1), faces.astype(np.int32))
-
-
 @pytest.fixture(scope="module")
-def patch():
-    skin = _grid(17, 96.0, 0.0)
-    far = Mesh.from_triangles(np.array([[500.0, 500, 0], [510, 500, 0], [500, 510, 0]]), [[0, 1, 2]])
-    parts = {**dict.fromkeys(PARTS, far), "skin": skin, "skull": _grid(17, 120.0, -8.0)}
-    groups = {name: np.zeros(len(skin.vertices), np.float32) for name in SKIN_GROUPS}
-    groups["face"] = (np.abs(skin.vertices[:, :2]).max(axis=1) < 47).astype(np.float32)
-    fibre = np.linspace([-25.0, 0, -6], [20, 0, -4], 6)
-    fibres = np.stack([fibre + [0, y, 0] for y in (-3, 0, 3)])
-    points = SurfacePoints((), (), np.zeros((0, 3), int), np.zeros((0, 3)))
-    return Head(
-        parts=parts,
-        groups=groups,
-        landmarks=points,
-        skull_landmarks=points,
-        feature_mesh=np.zeros((0, 3), int),
-        muscles=(Muscle(NAME, "linear", fibres, 9.0, 2.0, 0.35, "skull", "soft", far),),
-        jaw=Jaw(np.array([50.0, 0, -60]), np.array([-50.0, 0, -60]), np.array([0, -80.0, -90])),
-        eyes=(Eye(np.array([500.0, 0, 0]), 12.0, np.array([0, -1.0, 0])),) * 2,
-    )
+def patch(flat_patch):
+    return flat_patch(17, 96.0)
 
 
 @pytest.fixture(scope="module")
