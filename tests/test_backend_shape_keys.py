@@ -89,6 +89,25 @@ def test_a_bake_is_the_simulation(skin, shape_keys, reference_model):
     assert report["grin"]["peak_mm"] > 2 and report["nothing"]["peak_mm"] < 0.1
 
 
+def test_a_shape_over_another_is_the_difference_to_it(skin, shape_keys, reference, reference_model):
+    """`mouthClose` plays on top of `jawOpen`: both keys together are the two poses simulated together."""
+    from headshop.headshop_addon import baking, bridge
+    from headshop.sim.acting.pose import combined, control
+    from headshop.sim.tissue.solver import solve
+
+    poses, over = baking.poses_of_set(skin, "arkit")
+    assert len(poses) == 52 and over == {"mouthClose": "jawOpen"}
+    poses = {name: poses[name] for name in ("jawOpen", "mouthClose")}
+    finish(shape_keys.bake_poses(skin, poses, over=over))
+    rest = reference.skin.vertices
+    both = rest + sum(bridge.read_positions(skin, name) - rest for name in poses)
+    asked = control(reference_model, combined(poses["jawOpen"], poses["mouthClose"]))
+    truth = solve(reference_model, asked, max_iterations=shape_keys.ITERATIONS).state.skin
+    assert np.sqrt(((both - truth) ** 2).sum(axis=1).mean()) < 0.01
+    alone = np.linalg.norm(bridge.read_positions(skin, "mouthClose") - rest, axis=1).max()
+    assert alone > 5  # the lips come back together
+
+
 def test_a_cancelled_bake_leaves_no_trace(skin, shape_keys, reference_model, monkeypatch):
     from headshop.sim.acting.pose import Pose
 
