@@ -21,10 +21,11 @@ from headshop.sim.acting.expressions import expressions
 from headshop.sim.acting.pose import control
 from headshop.sim.anatomy.storage import load_head
 from headshop.sim.tissue import model as ours
-from headshop.sim.tissue import solver as our_solver
+from headshop.sim.tissue.dynamics import step as implicit_step
 from headshop.sim.tissue.lee1995 import model as lee
 from headshop.sim.tissue.lee1995 import solver as lee_solver
 from headshop.sim.tissue.lee1995.constants import DEFAULT
+from headshop.sim.tissue.solver import rest_state
 
 FRAME = 1 / 24
 SCALED = (
@@ -33,14 +34,14 @@ SCALED = (
 )
 
 
-def per_frame(solver, model, wanted, frames):
+def per_frame(step, rest, model, wanted, frames):
     """Processor seconds per frame after the first, and how far the skin's peak has come by the last, mm."""
-    state = solver.step(model, solver.rest_state(model), wanted, FRAME)
+    state = step(model, rest, wanted, FRAME)
     begin = time.process_time()
     for _ in range(frames):
-        state = solver.step(model, state, wanted, FRAME)
+        state = step(model, state, wanted, FRAME)
     seconds = (time.process_time() - begin) / frames
-    return seconds, float(np.linalg.norm(state.skin - solver.rest_state(model).skin, axis=1).max())
+    return seconds, float(np.linalg.norm(state.skin - rest.skin, axis=1).max())
 
 
 def lag(model, wanted, hertz):
@@ -69,10 +70,12 @@ def main():
         constants = replace(DEFAULT, **{k: factor * getattr(DEFAULT, k) for k in SCALED})
         model = lee.build_model(head, constants)
         face = model if factor == 1 else face
-        explicit, reached = per_frame(lee_solver, model, control(model, smile), options.frames)
+        explicit, reached = per_frame(
+            lee_solver.step, lee_solver.rest_state(model), model, control(model, smile), options.frames
+        )
         parameters = replace(own.parameters, dynamic_scale=factor * own.parameters.dynamic_scale)
         stiff = replace(own, parameters=parameters, cache={"matrix": own.cache["matrix"]})
-        implicit, _ = per_frame(our_solver, stiff, control(own, smile), options.frames)
+        implicit, _ = per_frame(implicit_step, rest_state(own), stiff, control(own, smile), options.frames)
         steps = int(np.ceil(FRAME / model.time_step)) / FRAME
         rows.append(
             {

@@ -7,11 +7,12 @@ import pytest
 from headshop.sim.acting.expressions import BASIC, expressions, for_head
 from headshop.sim.acting.pose import Pose, control
 from headshop.sim.adapt.shut_eyes import with_shut_eyes
+from headshop.sim.tissue.dynamics import step
 from headshop.sim.tissue.lids import eyeball_radius, lid_targets
 from headshop.sim.tissue.model import build_model, strengths
 from headshop.sim.tissue.muscle_field import base_name
 from headshop.sim.tissue.posing import posed_parts
-from headshop.sim.tissue.solver import rest_state, solve, step
+from headshop.sim.tissue.solver import rest_state, solve
 
 
 @pytest.fixture(scope="module")

@@ -6,9 +6,10 @@ import pytest
 
 from headshop.sim.acting.pose import Pose, control
 from headshop.sim.tissue import contact, planes
+from headshop.sim.tissue.dynamics import step
 from headshop.sim.tissue.energy import energy_gradient, find_contacts, pose_of
 from headshop.sim.tissue.model import build_model
-from headshop.sim.tissue.solver import rest_state, solve, step
+from headshop.sim.tissue.solver import rest_state, solve
 
 NAME = "zygomaticus_major_l"
 TABLE = {"zygomaticus_major": {"excursion_mm": 8.0}}

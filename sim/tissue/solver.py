@@ -1,10 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Rest positions and motion of the tissue.
+"""Rest positions of the tissue; `dynamics` moves it in time.
 
 `solve` minimises the energy: quasi-Newton steps (L-BFGS, Nocedal and Wright 2006, algorithm 7.4) on the prefactored
-matrix of the springs at rest (as in projective dynamics, Liu et al. 2017), with a guarded line search. `step` is one
-implicit Euler step of the equations of motion of Lee, Terzopoulos and Waters 1995, 3.8, as the minimum of the energy
-plus inertia: stable at any dt.
+matrix of the springs at rest (as in projective dynamics, Liu et al. 2017), with a guarded line search.
 """
 
 import numpy as np
@@ -42,7 +40,7 @@ def solve(
         at = np.flatnonzero(model.layers.free[pose.lid_node])
         start[pose.lid_node[at]] = pose.lid_goal[at]
     factor = factorised(model)
-    positions, energy, residual, iterations, planes = _minimise(
+    positions, energy, residual, iterations, planes = minimise(
         lambda x, planes: energy_gradient(model, pose, planes, x),
         lambda x: find_contacts(model, pose, x),
         factor,
@@ -123,7 +121,7 @@ def factorised(model: Model, dt: float | None = None):
     return kept[dt]
 
 
-def _minimise(value, contacts, factor, free, positions, max_iterations, tolerance):
+def minimise(value, contacts, factor, free, positions, max_iterations, tolerance):
     """Quasi-Newton descent; returns positions, energy, residual (mm), iterations and the last contact planes."""
     pairs = []
     residual, done, planes, energy = np.inf, 0, contacts(positions), 0.0
@@ -192,31 +190,3 @@ def _two_loop(gradient, pairs, factor):
     for (s, y, curvature), a in zip(pairs, reversed(kept), strict=True):
         r += (a - float(y @ r) / curvature) * s
     return r.reshape(gradient.shape)
-
-
-def step(model: Model, state: State, control: Control, dt: float, *, max_iterations: int = 12) -> State:
-    """The state ``dt`` seconds later: m a + gamma v + forces = muscles (3.8), implicit Euler."""
-    pose = pose_of(model, control)
-    free = model.cache["matrix"]["free"]
-    p = model.parameters
-    mass = model.mass[free][:, None]
-    scale = p.dynamic_scale
-    ahead = state.positions[free] + dt * state.velocities[free]
-    here = state.positions[free]
-    start = pose.reference.copy()
-    start[free] = here
-
-    def value(x, planes):
-        energy, gradient = energy_gradient(model, pose, planes, x)
-        flight, drag = x[free] - ahead, x[free] - here
-        inertia = mass * flight / dt**2
-        friction = mass * p.damping_rate * drag / dt
-        energy = scale * energy + 0.5 * float((inertia * flight).sum() + (friction * drag).sum())
-        return energy, scale * gradient + inertia + friction
-
-    positions, *_ = _minimise(
-        value, lambda x: find_contacts(model, pose, x), factorised(model, dt), free, start, max_iterations, 1e-3
-    )
-    velocities = np.zeros_like(positions)
-    velocities[free] = (positions[free] - here) / dt
-    return State(positions, velocities)
