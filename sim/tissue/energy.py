@@ -13,14 +13,15 @@ from scipy import sparse
 
 from ..mesh import vertex_normals
 from . import arch, contact
+from .axes import per_axis
 from .jaw import jaw_transform
 from .lids import lid_targets
 from .muscle_field import turned_lips
 from .planes import Planes, contact_energy, joined
 from .seal import seal_energy
-from .springs import spring_energy
+from .springs import spring_forces
 from .structures import Control, Model
-from .volume import corner_gather, volume_energy
+from .volume import corner_gather, volume_forces
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,8 +55,10 @@ def posed_reference(model: Model, rotation, translation) -> np.ndarray:
     """(3 n, 3) mm: every node moved by its share with the mandible."""
     layers = model.layers
     moved = layers.nodes @ rotation.T + translation
-    share = np.concatenate([layers.jaw, layers.jaw, layers.mandible])[:, None]
-    return layers.nodes + share * (moved - layers.nodes)
+    moved -= layers.nodes
+    moved *= np.concatenate([layers.jaw, layers.jaw, layers.mandible])[:, None]
+    moved += layers.nodes
+    return moved
 
 
 def pose_of(model: Model, control: Control) -> Pose:
@@ -78,10 +81,8 @@ def pose_of(model: Model, control: Control) -> Pose:
     lid_node, lid_goal, lid_stiffness = [], [], []
     for lids, closure in zip(model.lids, _lids_of(model, control), strict=True):
         goal = lid_targets(lids, closure[0], closure[1], control.gaze_of(lids.side))
-        # goals are offsets from the rest: the scan's own lids stay where they are
-        rest = model.layers.nodes[lids.column]
         lid_node.append(lids.column)
-        lid_goal.append(rest + goal - lid_targets(lids, 0.0, 0.0, np.zeros(2)))
+        lid_goal.append(goal + _lid_offset(model, lids))
         lid_stiffness.append(lids.hold)
     none = np.zeros((0, 3))
     return Pose(
@@ -98,6 +99,14 @@ def pose_of(model: Model, control: Control) -> Pose:
         gaze=np.array([control.gaze_of(side) for side in "lr"]),
         seal=float(np.clip(control.seal, 0, 1)),
     )
+
+
+def _lid_offset(model: Model, lids) -> np.ndarray:
+    """(v, 3) mm to add to the lids' targets, so that the scan's own lids stay where they are at rest."""
+    key = "lid_offset", lids.side
+    if key not in model.cache:
+        model.cache[key] = model.layers.nodes[lids.column] - lid_targets(lids, 0.0, 0.0, np.zeros(2))
+    return model.cache[key]
 
 
 def _lids_of(model: Model, control: Control):
@@ -129,7 +138,8 @@ def system_matrix(model: Model) -> dict:
         "quadratic": quadratic[free].tocsr(),
         "system": full[free][:, free].tocsc(),
         "free": free,
-        "gather": corner_gather(model.prisms, 3 * n),
+        # forces of springs, then of prism corners, onto the free nodes
+        "gather": sparse.hstack([springs.gather[free], corner_gather(model.prisms, 3 * n)[free]], format="csr"),
     }
 
 
@@ -160,36 +170,42 @@ def energy_gradient(model: Model, pose: Pose, planes: Planes, positions) -> tupl
     fixed = model.cache["matrix"]
     n = model.count
     free = fixed["free"]
-    energy, gradient = spring_energy(model.springs, positions)
-    if len(model.prisms):
-        e, g = volume_energy(positions, model.prisms, model.prism_volume, model.parameters.volume, fixed["gather"])
-        energy += e
-        gradient += g
-    e, g = contact_energy(planes, positions, model.parameters.contact * model.parameters.epidermis)
+    x = np.ascontiguousarray(positions.T)
+    energy, force = spring_forces(model.springs, x)
+    e, press = volume_forces(x, model.prisms, model.prism_volume, model.parameters.volume)
     energy += e
-    gradient += g
+    gradient = per_axis(fixed["gather"], np.concatenate([force, press], axis=1))
+    e, other = contact_energy(planes, positions, model.parameters.contact * model.parameters.epidermis)
+    energy += e
+    other = other.T
     # muscles: force push (1 - progress / reach), spent at reach; contraction is progress along the fibre's direction
     if len(pose.node):
         progress = np.einsum("ij,ij->i", positions[pose.node] - pose.reference[pose.node], pose.pull)
         left = np.maximum(1 - progress / pose.reach, 0)
         energy -= 0.5 * float((pose.push * pose.reach) @ (1 - left**2))
-        force = (pose.push * left)[:, None] * pose.pull
-        for axis in range(3):
-            gradient[:, axis] -= np.bincount(pose.node, force[:, axis], minlength=len(gradient))
+        _add(other, pose.node, (-pose.push * left)[:, None] * pose.pull)
     if pose.seal:
-        e, force = seal_energy(model.seal, pose.seal * model.parameters.seal, positions)
+        e, pulled = seal_energy(model.seal, pose.seal * model.parameters.seal, positions)
         energy += e
-        np.add.at(gradient, model.seal.lower, force)
-        np.subtract.at(gradient, model.seal.upper, force)
+        _add(other, model.seal.lower, pulled)
+        _add(other, model.seal.upper, -pulled)
     if len(pose.lid_node):
         off = positions[pose.lid_node] - pose.lid_goal
         pulled = pose.lid_stiffness[:, None] * off
         energy += 0.5 * float(np.einsum("ij,ij->", pulled, off))
-        np.add.at(gradient, pose.lid_node, pulled)
-    moved = positions[: 2 * n] - pose.reference[: 2 * n]
-    restoring = fixed["quadratic"] @ moved
-    energy += 0.5 * float(np.einsum("ij,ij->", restoring, moved[free]))
-    return energy, gradient[free] + restoring
+        _add(other, pose.lid_node, pulled)
+    moved = x[:, : 2 * n] - pose.reference[: 2 * n].T
+    restoring = per_axis(fixed["quadratic"], moved)
+    energy += 0.5 * float(np.einsum("ij,ij->", restoring, moved.take(free, axis=1, mode="clip")))
+    gradient += restoring
+    gradient += other.take(free, axis=1, mode="clip")
+    return energy, gradient.T
+
+
+def _add(total, node, values):
+    """Add values (k, 3) at nodes (k,) to ``total`` (3, n)."""
+    for axis in range(3):
+        total[axis] += np.bincount(node, values[:, axis], minlength=total.shape[1])
 
 
 def find_contacts(model: Model, pose: Pose, positions) -> Planes:

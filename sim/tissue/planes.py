@@ -41,18 +41,18 @@ def depths(planes: Planes, positions) -> np.ndarray:
 def contact_energy(planes: Planes, positions, stiffness: float) -> tuple[float, np.ndarray]:
     """Energy ½ k Σ depth² and its gradient over all nodes."""
     depth = depths(planes, positions)
-    gradient = np.zeros_like(positions)
+    gradient = np.zeros(positions.shape[::-1])
     hit = np.flatnonzero(depth > 0)
     if not len(hit):
-        return 0.0, gradient
+        return 0.0, gradient.T
     push = -stiffness * depth[hit, None] * planes.normal[hit]
     pair = planes.partner[hit]
+    both = pair >= 0
+    node = np.concatenate([planes.node[hit], pair[both]])
+    push = np.concatenate([push, -push[both]])
     for axis in range(3):
-        gradient[:, axis] += np.bincount(planes.node[hit], push[:, axis], minlength=len(positions))
-        both = pair >= 0
-        if both.any():
-            gradient[:, axis] -= np.bincount(pair[both], push[both, axis], minlength=len(positions))
-    return 0.5 * stiffness * float(depth @ depth), gradient
+        gradient[axis] = np.bincount(node, push[:, axis], minlength=len(positions))
+    return 0.5 * stiffness * float(depth @ depth), gradient.T
 
 
 def project(planes: Planes, positions, rounds: int = 2) -> np.ndarray:

@@ -10,6 +10,7 @@ import numpy as np
 from scipy import sparse
 
 from ..mesh import edges
+from .axes import per_axis
 from .parameters import Parameters
 from .structures import Layers, Springs
 
@@ -71,16 +72,28 @@ def assemble(nodes, first, second, kind, stiffness, stiff, limit) -> Springs:
         (s, len(nodes)),
     )
     rest = np.maximum(rest, 1e-3)
-    return Springs(first, second, kind, rest, stiffness, stiff, limit, difference, difference.T.tocsr())
+    gather = difference.T.tocsr()
+    return Springs(
+        first, second, kind, rest, stiffness, stiff, limit, np.flatnonzero(stiff > stiffness), difference, gather
+    )
+
+
+def spring_forces(springs: Springs, x: np.ndarray) -> tuple[float, np.ndarray]:
+    """Energy and g of each spring (3, s), the force on its first node (3.3); ``x`` (3, k) mm, axis by axis."""
+    d = per_axis(springs.difference, x)
+    length = np.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
+    stretch = length - springs.rest
+    tension = springs.stiffness * stretch
+    energy = float(tension @ stretch)
+    two = springs.biphasic
+    beyond = np.maximum(stretch[two] - springs.limit[two] * springs.rest[two], 0)
+    extra = (springs.stiff[two] - springs.stiffness[two]) * beyond
+    tension[two] += extra
+    d *= tension / np.maximum(length, 1e-9)
+    return 0.5 * (energy + float(extra @ beyond)), d
 
 
 def spring_energy(springs: Springs, positions: np.ndarray) -> tuple[float, np.ndarray]:
-    """Energy and its gradient (k, 3), the net of -g over each node (3.3)."""
-    d = springs.difference @ positions
-    length = np.sqrt(np.einsum("ij,ij->i", d, d))
-    stretch = length - springs.rest
-    beyond = np.maximum(stretch - springs.limit * springs.rest, 0)
-    extra = (springs.stiff - springs.stiffness) * beyond
-    tension = springs.stiffness * stretch + extra
-    energy = 0.5 * float(springs.stiffness @ stretch**2 + extra @ beyond)
-    return energy, springs.gather @ (d * (tension / np.maximum(length, 1e-9))[:, None])
+    """Energy and its gradient (k, 3), the net of -g over each node (3.3); ``positions`` (k, 3) mm."""
+    energy, force = spring_forces(springs, np.ascontiguousarray(positions.T))
+    return energy, per_axis(springs.gather, force).T

@@ -40,7 +40,8 @@ class Layers:
 
 @dataclass(frozen=True, eq=False)
 class Springs:
-    """The springs of 3.3. kind is an index into `springs.KINDS`; ``stiff`` and ``limit``: second phase (biphasic)."""
+    """The springs of 3.3. kind is an index into `springs.KINDS`; ``stiff`` and ``limit``: second phase (biphasic); those
+    that have one are the rows ``biphasic``."""
 
     first: np.ndarray
     second: np.ndarray
@@ -49,6 +50,7 @@ class Springs:
     stiffness: np.ndarray
     stiff: np.ndarray
     limit: np.ndarray
+    biphasic: np.ndarray
     difference: Any  # sparse (s, 3 n): node positions -> spring vectors
     gather: Any  # its transpose in row form
 

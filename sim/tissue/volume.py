@@ -9,6 +9,8 @@ is zero. What the paper's k2 term does (keep the prism's shape about its centre 
 import numpy as np
 from scipy import sparse
 
+from .axes import per_axis
+
 
 def volumes_and_gradients(positions: np.ndarray, prisms: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Volumes (t,) mm³ of prisms (t, 6), positive when the right way round, and their gradients (6, 3, t).
@@ -18,26 +20,41 @@ def volumes_and_gradients(positions: np.ndarray, prisms: np.ndarray) -> tuple[np
     D the sum of the three connecting vectors, the integral over the sections is V = - D · N / 6,
     N = [e_a x f_a + e_b x f_b + (e_a + e_b) x (f_a + f_b)] / 6.
     """
-    p = positions.T[:, prisms.T]  # (3, 6, t)
-    e_a, f_a, e_b, f_b = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0], p[:, 4] - p[:, 3], p[:, 5] - p[:, 3]
-    e, f = e_a + e_b, f_a + f_b
-    through = p[:, 3] + p[:, 4] + p[:, 5] - p[:, 0] - p[:, 1] - p[:, 2]
-    normal = (_cross(e_a, f_a) + _cross(e_b, f_b) + _cross(e, f)) / -36
-    volume = np.einsum("ij,ij->j", normal, through)
-    grad = np.empty((6, 3, len(prisms)))
-    scaled = through / -36
-    grad[1], grad[2] = _cross(f_a + f, scaled), _cross(scaled, e_a + e)
-    grad[4], grad[5] = _cross(f_b + f, scaled), _cross(scaled, e_b + e)
-    np.subtract(-normal, grad[1] + grad[2], out=grad[0])
-    np.subtract(normal, grad[4] + grad[5], out=grad[3])
-    grad[1:3] -= normal
-    grad[4:6] += normal
-    return volume, grad
+    volume, grad = _by_axis(np.ascontiguousarray(positions.T), prisms)
+    return volume, grad.transpose(1, 0, 2)
 
 
-def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """(3, t), of the columns of a and b (3, t)."""
-    out = np.empty_like(a)
+def _by_axis(x: np.ndarray, prisms: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """`volumes_and_gradients` of ``x`` (3, k) mm, axis by axis: volumes (t,) and gradients (3, 6, t)."""
+    # mode="clip" writes without a buffer; no index is out of range
+    p = x.take(prisms.T, axis=1, mode="clip").reshape(3, 2, 3, -1)  # axis, triangle (a, b), corner, prism
+    e, f = p[:, :, 1] - p[:, :, 0], p[:, :, 2] - p[:, :, 0]
+    sums = p[:, :, 0] + p[:, :, 1]
+    sums += p[:, :, 2]
+    through = sums[:, :1] - sums[:, 1:]
+    through /= 36
+    ef = _cross(e, f)
+    e_both, f_both = e[:, :1] + e[:, 1:], f[:, :1] + f[:, 1:]
+    normal = _cross(e_both, f_both)
+    normal += ef[:, :1]
+    normal += ef[:, 1:]
+    volume = np.einsum("ikj,ikj->j", normal, through)
+    normal /= 36
+    e += e_both
+    f += f_both
+    grad = np.empty_like(p)
+    _cross(f, through, grad[:, :, 1])
+    _cross(through, e, grad[:, :, 2])
+    np.add(grad[:, :, 1], grad[:, :, 2], out=grad[:, :, 0])
+    np.negative(grad[:, :, 0], out=grad[:, :, 0])
+    grad[:, 0] += normal
+    grad[:, 1] -= normal
+    return volume, grad.reshape(3, 6, -1)
+
+
+def _cross(a: np.ndarray, b: np.ndarray, out=None) -> np.ndarray:
+    """(3, ...), of the vectors along the first axis of a and b."""
+    out = np.empty(np.broadcast(a, b).shape) if out is None else out
     np.subtract(a[1] * b[2], a[2] * b[1], out=out[0])
     np.subtract(a[2] * b[0], a[0] * b[2], out=out[1])
     np.subtract(a[0] * b[1], a[1] * b[0], out=out[2])
@@ -55,10 +72,16 @@ def corner_gather(prisms: np.ndarray, count: int) -> sparse.csr_matrix:
     return sparse.csr_matrix((np.ones(k), (prisms.T.ravel(), np.arange(k))), (count, k))
 
 
+def volume_forces(x, prisms, rest_volume, k1) -> tuple[float, np.ndarray]:
+    """Energy ½ k1 Σ (V - V_rest)² / V_rest and what it does to each corner (3, 6 t), corner-major; ``x`` (3, k) mm."""
+    volume, grad = _by_axis(x, prisms)
+    volume -= rest_volume
+    pressure = k1 * volume / rest_volume
+    grad *= pressure
+    return 0.5 * float(pressure @ volume), grad.reshape(3, -1)
+
+
 def volume_energy(positions, prisms, rest_volume, k1, gather) -> tuple[float, np.ndarray]:
     """Energy ½ k1 Σ (V - V_rest)² / V_rest and its gradient (nodes, 3)."""
-    volume, grad = volumes_and_gradients(positions, prisms)
-    change = volume - rest_volume
-    pressure = k1 * change / rest_volume
-    grad *= pressure
-    return 0.5 * float(pressure @ change), gather @ grad.transpose(0, 2, 1).reshape(-1, 3)
+    energy, force = volume_forces(np.ascontiguousarray(positions.T), prisms, rest_volume, k1)
+    return energy, per_axis(gather, force).T
