@@ -21,6 +21,7 @@ from .planes import Planes, contact_energy, joined
 from .seal import seal_energy
 from .springs import spring_forces
 from .structures import Control, Model
+from .surroundings import Surroundings, outer_forces
 from .volume import corner_gather, volume_forces
 
 
@@ -30,7 +31,8 @@ class Pose:
 
     reference (3 n, 3): posed rest; rotation, translation of the mandible; pull (e, 3), push (e,), reach (e,), node (e,)
     of the active muscle entries and of the air in the mouth; lid_node (v,), lid_goal (v, 3), lid_stiffness (v,);
-    gaze (2, 2) of left and right eye; seal 0..1 of the lips.
+    gaze (2, 2) of left and right eye; seal 0..1 of the lips; load (3, 2 n) outer forces on epidermis and fascia in the unit
+    of stiffness times mm, or None.
     """
 
     reference: np.ndarray
@@ -45,6 +47,7 @@ class Pose:
     lid_stiffness: np.ndarray
     gaze: np.ndarray
     seal: float
+    load: np.ndarray | None = None
 
     def gaze_of(self, side: str) -> np.ndarray:
         """(2,) rad, of the eye on ``side`` ("l" or "r")."""
@@ -98,7 +101,17 @@ def pose_of(model: Model, control: Control) -> Pose:
         lid_stiffness=model.parameters.lid * np.concatenate(lid_stiffness) if lid_stiffness else np.zeros(0),
         gaze=np.array([control.gaze_of(side) for side in "lr"]),
         seal=float(np.clip(control.seal, 0, 1)),
+        load=load_at(model, control.around, reference),
     )
+
+
+def load_at(model: Model, around: Surroundings, positions, velocities=None) -> np.ndarray | None:
+    """`Pose.load` of nodes at ``positions`` (3 n, 3) mm with ``velocities`` (3 n, 3) mm/s (at rest by default)."""
+    triangles = model.contacts.triangles
+    force = outer_forces(
+        model, around, positions, velocities, lambda: vertex_normals(positions[: model.count], triangles)
+    )
+    return None if force is None else force.T / model.parameters.dynamic_scale
 
 
 def _lid_offset(model: Model, lids) -> np.ndarray:
@@ -195,6 +208,9 @@ def energy_gradient(model: Model, pose: Pose, planes: Planes, positions) -> tupl
         energy += 0.5 * float(np.einsum("ij,ij->", pulled, off))
         _add(other, pose.lid_node, pulled)
     moved = x[:, : 2 * n] - pose.reference[: 2 * n].T
+    if pose.load is not None:
+        energy -= float(np.einsum("ij,ij->", pose.load, moved))
+        other[:, : 2 * n] -= pose.load
     restoring = per_axis(fixed["quadratic"], moved)
     energy += 0.5 * float(np.einsum("ij,ij->", restoring, moved.take(free, axis=1, mode="clip")))
     gradient += restoring

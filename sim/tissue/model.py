@@ -66,6 +66,7 @@ def build_model(head: Head, parameters: Parameters = DEFAULT, table: dict | None
         faces=head.skin.faces,
         triangles=triangles,
         mass=np.tile(layers.area * parameters.mass_area / 2, 2),
+        exposed=np.asarray(head.groups.get("inner", np.zeros(n)), float) < 0.5,
         rigid={
             p: head.parts[p].vertices for p in (*JAW_PARTS, "eye_l", "eye_r", "skull", "teeth_upper") if p in head.parts
         },

@@ -112,7 +112,8 @@ def factorised(model: Model, dt: float | None = None):
         if dt is not None:
             free = model.cache["matrix"]["free"]
             p = model.parameters
-            matrix = p.dynamic_scale * matrix + sparse.diags(model.mass[free] * (1 / dt**2 + p.damping_rate / dt))
+            inertia = model.mass[free] * (1 / dt**2 + p.damping_rate / dt)
+            matrix = matrix + sparse.diags(inertia / p.dynamic_scale)
         while len(kept) > 3:
             kept.pop(next(iter(kept)))
         kept[dt] = splu(
@@ -137,11 +138,12 @@ def minimise(value, contacts, factor, free, positions, max_iterations, tolerance
     return positions, energy, residual, done, planes
 
 
-def descend(value, factor, free, positions, pairs, steps, tolerance=0.0):
+def descend(value, factor, free, positions, pairs, steps, tolerance=0.0, trust=0.0):
     """At most ``steps`` quasi-Newton steps; returns positions, energy, residual (mm) and the number of steps.
 
     value : positions (3 n, 3) -> energy and its gradient over the ``free`` nodes
     pairs : what is known of the curvature; is added to
+    trust : mm; a last step no longer than this is taken without a look at the energy behind it
     """
     energy, gradient = value(positions)
     residual = np.inf
@@ -153,7 +155,10 @@ def descend(value, factor, free, positions, pairs, steps, tolerance=0.0):
             direction = -factor.solve(gradient)
             slope = float(np.einsum("ij,ij->", direction, gradient))
         residual = float(np.sqrt((direction**2).sum(axis=1).max(initial=0.0)))
-        if residual <= tolerance:
+        if residual <= tolerance or (count == steps and residual <= trust):
+            if trust:
+                positions = positions.copy()
+                positions[free] += direction
             return positions, energy, residual, count
         length = min(1.0, 15.0 / residual)  # no node jumps farther than this in one step
         moved = positions.copy()

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..anatomy.head import Eye, Jaw
 from .parameters import Parameters
+from .surroundings import Surroundings
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,6 +158,7 @@ class Model:
     faces: np.ndarray
     triangles: np.ndarray
     mass: np.ndarray  # (2 n,) g
+    exposed: np.ndarray  # (n,) bool: skin that air can blow on
     rigid: dict[str, np.ndarray]  # vertices at rest of the parts that move rigidly
     cache: dict = field(default_factory=dict, repr=False)
 
@@ -198,6 +200,7 @@ class Control:
         (the lip is drawn against the teeth) to in front (it is pushed out more than at 0)
     seal : 0..1, how firmly the lips are held together where they touch at rest
     cheeks : -1..1, pressure of the air in the mouth: 1 puffed, -1 sucked in
+    around : gravity, motion of the head, wind
     """
 
     activations: np.ndarray
@@ -209,6 +212,7 @@ class Control:
     seal: float = 0.0
     tongue: float = 0.0
     eyes: np.ndarray = field(default_factory=lambda: np.zeros((2, 2)))
+    around: Surroundings = field(default_factory=Surroundings)
 
     def gaze_of(self, side: str) -> np.ndarray:
         """(2,) rad to the subject's left and up, of the eye on ``side`` ("l" or "r")."""
