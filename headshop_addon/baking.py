@@ -1,13 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Bakes by name: a set of poses, a performance file, or the keyed sliders, with the head's report kept up to date."""
 
-import bpy
+from functools import partial
 
-from ..sim.acting import arkit, expressions
+import bpy
+import numpy as np
+
+from ..sim.acting import arkit, expressions, outer
 from ..sim.acting.models import DEFAULT
 from ..sim.errors import InputError
 from ..sim.progress import Work, portion
-from . import heads, performance, shape_keys
+from . import head_place, heads, performance, shape_keys
 from .provenance import timed, versions
 
 SETS = ("expressions", "muscles", "arkit")
@@ -30,8 +33,12 @@ def poses_of_set(skin: bpy.types.Object, name: str) -> tuple[dict, dict]:
     raise InputError(f"The set {name} is not in this version: bake --set {', '.join(SETS)}.")
 
 
-def bake(skin: bpy.types.Object, pose_set: str | None = None, acted=None, model: str = DEFAULT) -> Work:
+def bake(
+    skin: bpy.types.Object, pose_set: str | None = None, acted=None, model: str = DEFAULT, dynamics: bool = False
+) -> Work:
     """Bake a set of poses, a performance (`sim.acting.performance`), or both, by a model (`sim.acting.models`).
+
+    dynamics : whether the tissue swings in the performance, or rests in every frame
 
     Returns the head's whole report. A performance sets the scene's frame rate and range to its own.
     """
@@ -45,7 +52,8 @@ def bake(skin: bpy.types.Object, pose_set: str | None = None, acted=None, model:
             shapes = yield from portion(shape_keys.bake_poses(skin, poses, model, over), 0.0, border)
     if acted is not None:
         with timed(seconds, "bake_performance"):
-            acting = yield from portion(bake_acted(skin, acted, model=model), 0.0 if pose_set is None else border, 1.0)
+            work = bake_acted(skin, acted, None, model, dynamics)
+            acting = yield from portion(work, 0.0 if pose_set is None else border, 1.0)
     if shapes is not None:
         report["shapes"] = shape_keys.baked_report(skin)
     if acting is not None:
@@ -56,11 +64,24 @@ def bake(skin: bpy.types.Object, pose_set: str | None = None, acted=None, model:
     return report
 
 
-def bake_acted(skin: bpy.types.Object, acted, scene: bpy.types.Scene | None = None, model: str = DEFAULT) -> Work:
-    """Bake a performance from frame 1 on, at its own frame rate, which becomes the scene's."""
+def bake_acted(
+    skin: bpy.types.Object,
+    acted,
+    scene: bpy.types.Scene | None = None,
+    model: str = DEFAULT,
+    dynamics: bool = False,
+) -> Work:
+    """Bake a performance from frame 1 on, at its own frame rate, which becomes the scene's; the head moves as it says."""
     scene = scene or bpy.context.scene
     poses = acted.frames()
-    report = yield from performance.bake_performance(skin, poses, model=model)
+    around = None
+    if any(name in outer.OUTER for name in acted.channels):
+        around = partial(outer.surroundings, acted, moving=dynamics)
+    report = yield from performance.bake_performance(
+        skin, poses, model=model, around=around, fps=acted.fps if dynamics else None
+    )
+    motion = outer.head_motion(acted)
+    head_place.write_motion(skin, motion, 1 + np.arange(len(poses)), f"{heads.head_name(skin)} Head Motion")
     scene.render.fps, scene.render.fps_base = round(acted.fps), round(acted.fps) / acted.fps
     scene.frame_start, scene.frame_end = 1, max(len(poses), 1)
     return report

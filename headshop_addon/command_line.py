@@ -67,6 +67,8 @@ def parser() -> argparse.ArgumentParser:
     bake = command("bake", "Simulate poses or a performance into shape keys.", chosen, plain)
     bake.add_argument("--set", choices=SETS, dest="poses", help="simulate each pose of a set into a shape key")
     bake.add_argument("--performance", metavar="FILE", help="simulate a performance into shape key animation")
+    about = "with the performance, let flesh swing, and feel the head's motion and gusts of wind"
+    bake.add_argument("--dynamic", action="store_true", help=about)
     about = "the model that acts: " + ", ".join(f"{m.name} ({m.title})" for m in models.MODELS.values())
     about += f" (default: {models.DEFAULT})"
     bake.add_argument("--model", choices=tuple(models.MODELS), default=models.DEFAULT, metavar="NAME", help=about)

@@ -77,6 +77,8 @@ def bake(options) -> None:
         )
     if options.poses == "facs":
         raise InputError(f"The set {options.poses} is not in this version: bake --set muscles, expressions or arkit.")
+    if options.dynamic and options.performance is None:
+        raise InputError("Only a performance moves in time: give --performance FILE, or leave out --dynamic.")
     output = options.output or options.head
     _require_kind(output, _BLEND)
     performance = None
@@ -90,7 +92,7 @@ def bake(options) -> None:
         skin = _open(options)
         from . import baking
 
-        report = _run(baking.bake(skin, options.poses, performance, options.model), options)
+        report = _run(baking.bake(skin, options.poses, performance, options.model, options.dynamic), options)
         _save(blend)
         _write_plain(skin, plain, outputs)
     if not options.quiet:

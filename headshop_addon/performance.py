@@ -5,6 +5,7 @@ What is written plays without the extension: relative shape keys and one slotted
 """
 
 import json
+from dataclasses import replace
 
 import bpy
 import numpy as np
@@ -12,16 +13,18 @@ import numpy as np
 from ..sim.acting.models import DEFAULT, model_named
 from ..sim.acting.pose import CONTROLS, Pose, control
 from ..sim.acting.principal import principal_shapes
+from ..sim.errors import InputError
 from ..sim.progress import Progress, Work
 from ..sim.tissue.posing import posed_parts
-from . import bridge, heads, shape_keys
-from .slotted_actions import animate_keys, curves_of, new_action, stop_keys
+from . import bridge, head_place, heads, shape_keys
+from .slotted_actions import animate_keys, curves_of, new_action, stop
 
 PERFORMANCE = "headshop_performance"
 #: mm that the principal shape keys may differ from the simulation, which itself settles to 0.01 mm: asking for more
 #: would spend shape keys on its noise.
 TOLERANCE = 0.02
 ITERATIONS = 60  # a frame begins where the one before ended, so little is left to do
+MET = 0.1  # mm: the last step of the solver at which a frame in motion counts as converged
 _PATHS = {"headshop.muscles.": "muscles", "headshop.controls.": "controls"}
 
 
@@ -55,20 +58,26 @@ def bake_performance(
     first_frame: int = 1,
     name: str = "Performance",
     model: str = DEFAULT,
+    around=None,
+    fps: float | None = None,
 ) -> Work:
     """Simulate ``poses``, one a frame from ``first_frame`` on, into animated shape keys; returns a report.
 
-    Each frame starts from the one before. The report holds ``model``, ``frames``, ``converged`` (frames), ``keys``
+    Without ``fps`` every frame comes to rest, and starts from the one before; with it (frames a second), the tissue moves in
+    time, and swings. The report holds ``model``, ``frames``, ``converged`` (frames), ``keys``
     (part -> count), ``error_mm`` (of the compression) and ``peak_mm``. Nothing is written before all is simulated. An earlier
     performance of the head is replaced; its other shape keys stay.
 
     model : name of the model that acts (`sim.acting.models`)
+    around : function of the skin's points (n, 3) mm at rest that returns what acts from outside at every frame
 
     Raises
     ------
-    InputError : no such model, not a whole head, or linked from another file.
+    InputError : no such model, one that cannot move in time, not a whole head, or linked from another file.
     """
     acting = model_named(model)
+    if fps is not None and not acting.moves:
+        raise InputError(f"The model {model} comes to rest in every frame: only {DEFAULT} bakes with dynamics.")
     shape_keys.require_editable(skin)
     yield Progress(0.0, "Building the tissue")
     head = heads.read_head(skin)
@@ -76,13 +85,16 @@ def bake_performance(
     state = acting.rest_state(built)
     neutral = posed_parts(built, state, control(built, Pose()))
     motion = {part: np.empty((len(poses), *points.shape), dtype=np.float32) for part, points in neutral.items()}
+    controls = [control(built, pose) for pose in poses]
+    if around is not None:
+        outer = around(neutral["skin"])
+        controls = [replace(asked, around=felt) for asked, felt in zip(controls, outer, strict=True)]
     converged = 0
-    for number, pose in enumerate(poses):
+    states = _at_rest(acting, built, controls) if fps is None else _in_time(acting, built, controls, fps)
+    for number, asked in enumerate(controls):
         yield Progress(0.05 + 0.9 * number / len(poses), f"Simulating frame {number + 1} of {len(poses)}")
-        asked = control(built, pose)
-        solution = acting.solve(built, asked, state, max_iterations=ITERATIONS)
-        state = solution.state
-        converged += bool(solution.converged)
+        state, settled = next(states)
+        converged += bool(settled)
         for part, points in posed_parts(built, state, asked).items():
             motion[part][number] = points - neutral[part]
     yield Progress(0.96, "Compressing")
@@ -91,12 +103,28 @@ def bake_performance(
     write_performance(skin, found, np.arange(first_frame, first_frame + len(poses)), name)
     return {
         "model": model,
+        "dynamics": fps is not None,
         "frames": len(poses),
         "converged": converged,
         "keys": {part: len(each.shapes) for part, each in found.items()},
         "error_mm": max((each.error for each in found.values()), default=0.0),
         "peak_mm": float(np.linalg.norm(motion["skin"], axis=2).max(initial=0.0)),
     }
+
+
+def _at_rest(acting, built, controls):
+    """Yields the state at rest at each of ``controls``, begun where the one before ended, and whether it is one."""
+    state = acting.rest_state(built)
+    for asked in controls:
+        solution = acting.solve(built, asked, state, max_iterations=ITERATIONS)
+        state = solution.state
+        yield state, solution.converged
+
+
+def _in_time(acting, built, controls, fps):
+    """Yields the state in motion at each of ``controls``, and whether its equations are met."""
+    for state, residual in acting.moving(built, controls, 1 / fps):
+        yield state, residual <= MET
 
 
 def write_performance(skin, found: dict, frames: np.ndarray, name: str) -> None:
@@ -131,10 +159,11 @@ def _free_name(obj, name: str) -> str:
 
 def remove_performance(skin: bpy.types.Object) -> None:
     """Take a baked performance off a head."""
+    head_place.remove_motion(skin)
     for obj in heads.parts_of(skin).values():
         names = json.loads(obj.get(PERFORMANCE, "[]"))
         if obj.data.shape_keys is not None:
-            stop_keys(obj.data.shape_keys)
+            stop(obj.data.shape_keys)
         shape_keys.remove_keys(obj, names)
         if PERFORMANCE in obj:
             del obj[PERFORMANCE]

@@ -139,6 +139,29 @@ class HEADSHOP_PG_object(bpy.types.PropertyGroup):
         options=set(),
         update=live.on_model,
     )
+    dynamics: BoolProperty(
+        name="Dynamics",
+        description="In Keyed Sliders to Animation, flesh swings: it feels the scene's gravity, the motion of the head's "
+        "object and wind. Off: it comes to rest in every frame",
+        options=set(),
+    )
+    wind: FloatVectorProperty(
+        name="Wind",
+        description="Where the air goes and how fast, along the scene's axes",
+        size=3,
+        subtype="VELOCITY",
+        unit="VELOCITY",
+        options=set(),
+    )
+    turbulence: FloatProperty(
+        name="Turbulence",
+        description="By what share of its speed the wind fluctuates",
+        min=0.0,
+        max=1.0,
+        subtype="FACTOR",
+        options=set(),
+    )
+    wind_seed: IntProperty(name="Seed", description="Another seed, other gusts", min=0, options=set())
     detail: EnumProperty(
         name="Detail",
         description="How the scan's fine detail is shown, which the mesh cannot follow",

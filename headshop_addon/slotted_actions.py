@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Animation of shape key values in one slotted action (Blender 4.4 and later): a slot for each animated datablock."""
+"""Animation in one slotted action (Blender 4.4 and later): a slot for each animated datablock."""
 
 import bpy
 import numpy as np
@@ -17,20 +17,27 @@ def new_action(name: str) -> bpy.types.Action:
 
 
 def animate_keys(action: bpy.types.Action, keys: bpy.types.Key, frames, weights: dict[str, np.ndarray]) -> None:
-    """Give ``keys`` a slot of ``action``: shape key name -> values (f,) stand at ``frames`` (f,), linear between.
+    """Give ``keys`` a slot of ``action``: shape key name -> values (f,) stand at ``frames`` (f,), linear between."""
+    paths = {(f'key_blocks["{bpy.utils.escape_identifier(name)}"].value', 0): v for name, v in weights.items()}
+    animate(action, keys, "KEY", frames, paths)
+
+
+def animate(action: bpy.types.Action, owner: bpy.types.ID, kind: str, frames, curves: dict) -> None:
+    """Give ``owner``, an ID of ``kind``, a slot of ``action``: (data path, index) -> values (f,) stand at ``frames`` (f,),
+    linear between.
 
     Where an artist animates the same datablock, his action stays and ours plays beside it as an NLA strip.
     """
-    slot = action.slots.new(id_type="KEY", name=keys.name)
+    slot = action.slots.new(id_type=kind, name=owner.name)
     bag = action.layers[0].strips[0].channelbag(slot, ensure=True)
-    for name, values in weights.items():
-        curve = bag.fcurves.new(f'key_blocks["{bpy.utils.escape_identifier(name)}"].value')
+    for (path, index), values in curves.items():
+        curve = bag.fcurves.new(path, index=index)
         curve.keyframe_points.add(len(frames))
         points = np.stack([frames, values], axis=1).astype(np.float32)
         curve.keyframe_points.foreach_set("co", points.ravel())
         curve.keyframe_points.foreach_set("interpolation", np.full(len(frames), _LINEAR, dtype=np.int32))
         curve.update()
-    data = keys.animation_data or keys.animation_data_create()
+    data = owner.animation_data or owner.animation_data_create()
     if data.action is None:
         data.action, data.action_slot = action, slot
     else:
@@ -38,9 +45,9 @@ def animate_keys(action: bpy.types.Action, keys: bpy.types.Key, frames, weights:
         strip.action_slot = slot
 
 
-def stop_keys(keys: bpy.types.Key) -> None:
+def stop(owner: bpy.types.ID) -> None:
     """Take our actions off a datablock; an action nobody uses any more is deleted."""
-    data = keys.animation_data
+    data = owner.animation_data
     if data is None:
         return
     actions = {data.action} if data.action is not None and data.action.get(OURS) else set()

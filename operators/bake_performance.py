@@ -15,6 +15,12 @@ class HEADSHOP_OT_bake_performance(Job, bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
     panel = "bake"
 
+    dynamics: bpy.props.BoolProperty(
+        name="Dynamics",
+        description="Flesh swings: it feels gravity, the motion of the head's object and wind",
+        options={"SKIP_SAVE"},
+    )
+
     @classmethod
     def poll(cls, context):
         """Needs a head with keyed sliders."""
@@ -32,8 +38,14 @@ class HEADSHOP_OT_bake_performance(Job, bpy.types.Operator):
         from ..headshop_addon.performance import bake_performance, keyed_poses
 
         scene, skin = context.scene, active.skin(context)
-        poses = keyed_poses(skin, range(scene.frame_start, scene.frame_end + 1))
-        return (yield from bake_performance(skin, poses, scene.frame_start))
+        frames = range(scene.frame_start, scene.frame_end + 1)
+        poses = keyed_poses(skin, frames)
+        moving = {}
+        if self.dynamics:
+            from ..headshop_addon.head_place import felt_in, frame_rate
+
+            moving = {"around": felt_in(skin, scene, frames), "fps": frame_rate(scene)}
+        return (yield from bake_performance(skin, poses, scene.frame_start, **moving))
 
     def finish(self, context, result):
         """Say what came out."""

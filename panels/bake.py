@@ -25,7 +25,15 @@ class HEADSHOP_PT_bake(SidebarPanel, bpy.types.Panel):
         column.operator("headshop.bake_expressions", text="Expressions to Shape Keys", icon="SHAPEKEY_DATA")
         column.operator("headshop.bake_muscles", text="Muscles to Shape Keys", icon="SHAPEKEY_DATA")
         column = layout.column(align=True)
-        column.operator("headshop.bake_performance", text="Keyed Sliders to Animation", icon="ACTION")
+        settings = skin.headshop
+        bake = column.operator("headshop.bake_performance", text="Keyed Sliders to Animation", icon="ACTION")
+        bake.dynamics = settings.dynamics
+        column.prop(settings, "dynamics")
+        if settings.dynamics:
+            column = layout.column(align=True)
+            column.prop(settings, "wind")
+            column.prop(settings, "turbulence", slider=True)
+            column.prop(settings, "wind_seed")
         if dependencies.available("scipy"):
             from ..headshop_addon.shape_keys import baked_names
 

@@ -183,6 +183,7 @@ def test_nothing_to_bake(capfd, tmp_path):
     head = tmp_path / "head.blend"
     head.write_bytes(b"anything")
     assert "--set" in fails(capfd, tmp_path, "bake", head)
+    assert "--performance" in fails(capfd, tmp_path, "bake", head, "--set", "arkit", "--dynamic")
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

@@ -45,6 +45,15 @@ class ActingModel:
         solution = solver.solve(model, control, state, max_iterations=rounds)
         return solution.state, solution.converged
 
+    @property
+    def moves(self) -> bool:
+        """Whether it can act in time, with masses that swing, and feels gravity, wind and the motion of the head."""
+        return self.name == DEFAULT
+
+    def moving(self, model, controls, dt: float):
+        """Yields the state and the residual (mm) at each of ``controls``, ``dt`` seconds apart; of models that move."""
+        return self._module("dynamics").moving(model, controls, dt)
+
     def _module(self, name: str):
         return import_module(f"..{self.package}.{name}", __package__)
 

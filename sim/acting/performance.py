@@ -4,6 +4,11 @@
 ``{"format": "headshop-performance/1", "fps": 24, "channels": {"zygomaticus_major_l": [[0.0, 0.0], [0.8, 0.9]], ...}}``
 with times in seconds and values as in `pose.Pose`. Between keys a channel eases: it leaves and arrives at rest at every
 extreme and passes smoothly through keys on the way (monotone cubic, Fritsch and Carlson 1980), so nothing overshoots.
+
+Channels of `outer.OUTER` are not of the face but of the room that it is in: ``head_x``, ``head_y``, ``head_z`` in mm along the
+scan's axes and ``head_turn`` (to its left), ``head_nod`` (down), ``head_tilt`` (to its left shoulder) in rad move the
+head; ``wind_x``, ``wind_y``, ``wind_z`` in mm/s say where the air goes, ``wind_turbulence`` 0..1 by what share of its speed it
+fluctuates, differently for each ``"seed"``; ``gravity_x``, ``gravity_y``, ``gravity_z`` in mm/s² replace the earth's.
 """
 
 import json
@@ -15,6 +20,7 @@ import numpy as np
 
 from ..anatomy.storage import write_atomically
 from ..errors import InputError
+from .outer import OUTER
 from .pose import Pose, pose_from
 
 FORMAT = "headshop-performance/1"
@@ -23,11 +29,12 @@ _LONGEST = 36000.0  # seconds; a longer key time is a slip of the unit
 
 @dataclass(frozen=True)
 class Performance:
-    """fps frames a second; channels: name -> ((time s, value), ...) in order of time; name for the artist."""
+    """fps frames a second; channels: name -> ((time s, value), ...) in order of time; name for the artist; seed of gusts."""
 
     channels: dict[str, tuple[tuple[float, float], ...]] = field(default_factory=dict)
     fps: float = 24.0
     name: str = "performance"
+    seed: int = 0
 
     @property
     def duration(self) -> float:
@@ -45,7 +52,8 @@ class Performance:
 
     def pose(self, time: float) -> Pose:
         """The pose at ``time`` s."""
-        return pose_from({name: _eased(keys, time) for name, keys in self.channels.items() if keys})
+        face = {name: _eased(keys, time) for name, keys in self.channels.items() if keys and name not in OUTER}
+        return pose_from(face)
 
     def frames(self) -> list[Pose]:
         """One pose per frame."""
@@ -128,7 +136,10 @@ def performance_from(document, where: str = "The performance") -> Performance:
         if times[0] < 0 or times[-1] > _LONGEST:
             raise InputError(f"{where}: the times of channel {name!r} must lie between 0 and {_LONGEST:g} seconds.")
         out[name] = tuple((float(t), float(v)) for t, v in keys)
-    return Performance(out, float(fps), str(document.get("name", "performance")))
+    seed = document.get("seed", 0)
+    if not isinstance(seed, int) or isinstance(seed, bool) or seed < 0:
+        raise InputError(f'{where}: "seed" must be a whole number from 0 up, not {seed!r}.')
+    return Performance(out, float(fps), str(document.get("name", "performance")), seed)
 
 
 def _is_number(x) -> bool:
@@ -141,6 +152,7 @@ def write_performance(path, performance: Performance) -> None:
         "format": FORMAT,
         "name": performance.name,
         "fps": performance.fps,
+        "seed": performance.seed,
         "channels": {name: [list(k) for k in keys] for name, keys in performance.channels.items()},
     }
     write_atomically(path, (json.dumps(document, indent=1) + "\n").encode())

@@ -13,21 +13,26 @@ from dataclasses import dataclass, field, fields, is_dataclass, replace
 import numpy as np
 
 from .energy import Pose, energy_gradient, find_contacts, load_at, pose_of
-from .solver import descend, factorised
+from .solver import descend, factorised, solve
 from .structures import Control, Model, State
 
 #: Where the first stage lies in a step, and the share of the step over which either is implicit.
 GAMMA = 1 - np.sqrt(0.5)
 #: The last quasi-Newton step of a stage is taken without a look at the energy behind it if no node moves farther, mm.
 _TRUST = 0.5
+#: What `moving` asks of a stage: quasi-Newton steps at most, and the mm at which fewer do. Its frames are parted into steps
+#: of at most this many seconds.
+ROUNDS, TOLERANCE, LONGEST = 12, 0.05, 1 / 24
 
 
 @dataclass(eq=False)
 class Memory:
-    """What a step leaves to the next of the same dt: pairs of L-BFGS, and the pose at its end."""
+    """What a step leaves to the next of the same dt: pairs of L-BFGS, the pose at its end, and the mm of its last
+    quasi-Newton step (of all nodes the farthest)."""
 
     pairs: list = field(default_factory=list)
     pose: Pose | None = None
+    residual: float = 0.0
 
 
 def step(
@@ -72,6 +77,27 @@ def step(
     return State(second, velocities)
 
 
+def moving(model: Model, controls, dt: float, first: State | None = None):
+    """Yields the state at every control, ``dt`` seconds apart, and the mm of the last quasi-Newton step there.
+
+    first : the state at the first control; by default the tissue has come to rest there
+    """
+    memory, before, state = Memory(), None, first
+    parts = max(1, int(np.ceil(dt / LONGEST - 1e-6)))
+    for control in controls:
+        if state is None:
+            solution = solve(model, control, max_iterations=200)
+            state, memory.residual = solution.state, solution.residual
+        elif before is not None:
+            for k in range(parts):
+                start, end = (control_between(before, control, share / parts) for share in (k, k + 1))
+                state = step(
+                    model, state, end, dt / parts, before=start, memory=memory, rounds=ROUNDS, tolerance=TOLERANCE
+                )
+        yield state, memory.residual
+        before = control
+
+
 def _stage(model, control, pose, here, velocity, start, dt, memory, rounds, tolerance):
     """(3 n, 3) mm: the nodes after an implicit Euler step of ``dt`` from ``here`` with ``velocity``."""
     free = model.cache["matrix"]["free"]
@@ -94,7 +120,8 @@ def _stage(model, control, pose, here, velocity, start, dt, memory, rounds, tole
         return energy + 0.5 * float(np.einsum("ij,ij->", inertia, off)), gradient + inertia
 
     factor = factorised(model, dt)
-    return descend(value, factor, free, positions, memory.pairs, rounds, tolerance, _TRUST)[0]
+    positions, _, memory.residual, _ = descend(value, factor, free, positions, memory.pairs, rounds, tolerance, _TRUST)
+    return positions
 
 
 def carried(positions, before: Pose | None, after: Pose) -> np.ndarray:
