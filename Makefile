@@ -48,6 +48,7 @@ bench: $(READY)
 	$(PY) -m pip install --quiet "trimesh>=4" rtree
 	$(PY) benchmarks/adapt.py
 	$(PY) benchmarks/tissue.py
+	$(PY) benchmarks/frames.py
 
 $(READY): pyproject.toml
 	@test -n "$(PYTHON)" || { echo "Head Shop needs python3.11 or python3.13 on the PATH (or: make PYTHON=/path/to/python)"; exit 2; }

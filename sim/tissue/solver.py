@@ -122,14 +122,17 @@ def factorised(model: Model, dt: float | None = None):
     return kept[dt]
 
 
-def minimise(value, contacts, factor, free, positions, max_iterations, tolerance):
-    """Quasi-Newton descent; returns positions, energy, residual (mm), iterations and the last contact planes."""
-    pairs = []
+def minimise(value, contacts, factor, free, positions, max_iterations, tolerance, pairs=None, trust=0.0):
+    """Quasi-Newton descent; returns positions, energy, residual (mm), iterations and the last contact planes.
+
+    pairs, trust : as in `descend`
+    """
+    pairs = [] if pairs is None else pairs
     residual, done, planes, energy = np.inf, 0, contacts(positions), 0.0
     for until in (*sorted(k for k in _REFRESH if k < max_iterations), max_iterations):
         at = planes
         positions, energy, residual, steps = descend(
-            lambda x, at=at: value(x, at), factor, free, positions, pairs, until - done, tolerance
+            lambda x, at=at: value(x, at), factor, free, positions, pairs, until - done, tolerance, trust
         )
         done += steps
         if residual <= tolerance or done < until or until == max_iterations:

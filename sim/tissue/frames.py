@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The tissue following a moving control frame by frame, contact included: a few steps of the solver each.
+
+What the quasi-Newton steps have learnt of the energy's curvature stays nearly true from one frame to the next, so it is
+kept. A frame starts where jaw and lids carry the last one, and goes on by what the frames before moved for the like
+change of the control.
+"""
+
+import numpy as np
+
+from .energy import Pose, energy_gradient, find_contacts, pose_of
+from .planes import project
+from .solver import factorised, minimise, rest_state, skin_planes
+from .structures import Control, Model, State
+
+#: Steps that a frame is given, and the mm of a step at which fewer do.
+STEPS, TOLERANCE = 8, 0.1
+#: The last step is taken without a look at the energy behind it if no node moves farther, mm.
+_TRUST = 0.3
+#: Frames before that foretell the next, how far they may not be trusted (ridge, a share of their changes), and how much
+#: of their motion a frame may begin with (factor, mm).
+_PAST, _RIDGE, _MOST, _FAR = 2, 0.1, 1.5, 3.0
+#: mm on the skin, about, that jaw, lids, gaze, lips, cheeks and the seal of the lips move at 1 (rad): what counts as a
+#: like change.
+_JAW, _LIDS, _GAZE, _LIPS, _CHEEKS, _SEAL = (15.0, 5.0, 5.0), 3.0, 3.0, 3.0, 6.0, 3.0
+
+
+class Frames:
+    """Follows controls with a model, one frame a call; starts at rest. Same calls, same results.
+
+    state : the `State` of the last frame; residual : mm, the step that was left of it; converged : whether that is no
+    more than was asked for; iterations : steps that it took
+    """
+
+    def __init__(self, model: Model):
+        self.model = model
+        self.state = rest_state(model)
+        self.residual, self.iterations, self.converged = 0.0, 0, True
+        self._pairs = []
+        self._at = self._goal = self._asked = None  # where the nodes were, were expected, and the control as mm
+        self._off = self._change = None  # by how much they lay elsewhere, and the last change of the control
+        self._past = []
+
+    def follow(self, control: Control, steps: int = STEPS, tolerance: float = TOLERANCE) -> State:
+        """The `State` at rest under ``control``, as near as so many ``steps`` of the solver come, or as a step of no more
+        than ``tolerance`` mm leaves it."""
+        model = self.model
+        pose = pose_of(model, control)
+        positions, _, self.residual, self.iterations, planes = minimise(
+            lambda x, planes: energy_gradient(model, pose, planes, x),
+            lambda x: find_contacts(model, pose, x),
+            factorised(model),
+            model.cache["matrix"]["free"],
+            self._start(pose, _millimetres(model, control)),
+            steps,
+            tolerance,
+            self._pairs,
+            _TRUST,
+        )
+        self.converged = self.residual <= tolerance
+        self._at = positions
+        positions = project(skin_planes(planes, model.count), positions)
+        self.state = State(positions, np.zeros_like(positions))
+        return self.state
+
+    def _start(self, pose: Pose, asked: np.ndarray) -> np.ndarray:
+        """(3 n, 3) mm: where the nodes are likely to come to rest, bone and what is not free in its place."""
+        free = self.model.cache["matrix"]["free"]
+        goal = pose.reference.copy()
+        goal[pose.lid_node] = pose.lid_goal
+        start = pose.reference.copy()
+        start[free] = goal[free]
+        if self._at is not None:
+            off = (self._at - self._goal)[free]
+            change = asked - self._asked
+            if self._off is not None:
+                self._past = [*self._past, (self._change, off - self._off)][-_PAST:]
+            start[free] += off + self._foretold(change)
+            self._off, self._change = off, change
+        self._goal, self._asked = goal, asked
+        return start
+
+    def _foretold(self, change: np.ndarray):
+        """(m, 3) mm: what the last frames moved for the part of their changes that ``change`` is made of."""
+        if not self._past:
+            return 0.0
+        changes = np.array([one for one, _ in self._past])
+        products = changes @ changes.T
+        scale = np.trace(products)
+        if scale < 1e-9:
+            return 0.0
+        ridge = _RIDGE * scale / len(changes) * np.eye(len(changes))
+        share = np.clip(np.linalg.solve(products + ridge, changes @ change), -_MOST, _MOST)
+        moved = np.tensordot(share, [motion for _, motion in self._past], 1)
+        farthest = np.sqrt(np.einsum("ij,ij->i", moved, moved).max(initial=0.0))
+        return moved * min(1.0, _FAR / max(farthest, _FAR))
+
+
+def _millimetres(model: Model, control: Control) -> np.ndarray:
+    """(k,) what a control asks, in mm on the skin."""
+    return np.concatenate(
+        [
+            np.clip(control.activations, 0, 1) * model.muscles.excursion,
+            np.multiply(control.jaw, _JAW),
+            _LIDS * np.ravel(control.lids),
+            _GAZE * np.ravel(control.gaze),
+            _GAZE * np.ravel(control.eyes),
+            _LIPS * np.ravel(control.lips),
+            [_CHEEKS * control.cheeks, _SEAL * control.seal],
+        ]
+    )
