@@ -49,6 +49,7 @@ bench: $(READY)
 	$(PY) benchmarks/adapt.py
 	$(PY) benchmarks/tissue.py
 	$(PY) benchmarks/frames.py
+	$(PY) benchmarks/response.py
 
 $(READY): pyproject.toml
 	@test -n "$(PYTHON)" || { echo "Head Shop needs python3.11 or python3.13 on the PATH (or: make PYTHON=/path/to/python)"; exit 2; }

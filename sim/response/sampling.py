@@ -10,7 +10,7 @@ import numpy as np
 
 from ..acting.pose import CONTROLS, Pose, control, pose_from
 from ..progress import Progress, Work
-from ..tissue.muscle_field import JAW_MUSCLES, base_name
+from ..tissue.muscle_field import JAW_MUSCLES, LIPS, base_name
 from ..tissue.solver import solve
 from ..tissue.structures import Model
 from .inputs import input_names, inputs_of
@@ -25,8 +25,9 @@ ITERATIONS = 40
 
 _EYES = ("frontalis", "corrugator", "lateral_corrugator", "depressor_supercilii", "procerus", "orbicularis_oculi")
 _EYES += ("levator_palpebrae", "auricularis", "occipitalis")
-#: How often a mixture uses every muscle of a place at once, a control at all, and the jaw open.
-_CROWD, _OFTEN, _OPEN = 0.15, 0.3, 0.55
+#: How often a mixture uses every muscle of a place at once, a control at all, the jaw open, and each sphincter of the
+#: lips and its centre: what lips do against each other and the teeth is the hardest to learn.
+_CROWD, _OFTEN, _OPEN, _LIPS = 0.15, 0.3, 0.55, 0.45
 #: Channels drawn a little beyond their end and clipped, so that the end itself is seen often.
 _BEYOND = 1.15
 
@@ -72,10 +73,15 @@ def mixed_pose(muscle_names, rng: np.random.Generator) -> Pose:
         few = min(len(place), 1 + rng.geometric(0.25)) if rng.uniform() > _CROWD else len(place)
         for k in rng.choice(len(place), few, replace=False) if place else ():
             values[place[k]] = min(rng.uniform(0, _BEYOND), 1.0)
+    for sphincter, centre in zip(LIPS, ("lip_upper_forward", "lip_lower_forward"), strict=True):
+        if rng.uniform() < _LIPS and sphincter in muscle_names:
+            values[sphincter] = min(rng.uniform(0.1, _BEYOND), 1.0)
+        if rng.uniform() < _LIPS:
+            values[centre] = float(np.clip(rng.uniform(-_BEYOND, _BEYOND), -1, 1))
     if rng.uniform() < _OPEN:
         values["jaw_open"] = min(rng.uniform(0, 1.05), 1.0)
     for name in channels(muscle_names)[len(muscle_names) :]:
-        if name == "jaw_open" or rng.uniform() > _OFTEN:
+        if name.startswith(("jaw_open", "lip_")) or rng.uniform() > _OFTEN:
             continue
         low = -_BEYOND if name in SIGNED else 0.0
         values[name] = float(np.clip(rng.uniform(low, _BEYOND), -1, 1))

@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How far a rig is from the simulation on poses that it has never seen."""
+
+import numpy as np
+
+from ..acting import arkit, expressions
+from ..acting.pose import Pose, control, pose_from
+from ..progress import Progress, Work, portion
+from ..tissue.muscle_field import JAW_MUSCLES, base_name
+from ..tissue.solver import solve
+from ..tissue.structures import Model
+from .rig import Rig
+
+#: The simulation counts as converged with steps under this, mm, or after so many of them.
+TOLERANCE, ITERATIONS = 0.002, 300
+KINDS = ("one", "three", "all", "three_jaw", "all_jaw")
+
+
+def unseen_poses(muscle_names, kind: str, count: int, rng: np.random.Generator) -> list[Pose]:
+    """``count`` poses of one, three or all muscles at random, with the jaw anywhere in its range if the kind says so; or
+    the poses of a table: ``expressions``, ``arkit``."""
+    tables = {"expressions": expressions.expressions, "arkit": arkit.poses}
+    if kind in tables:
+        return [expressions.for_head(pose, muscle_names) for pose in tables[kind]().values()]
+    names = [name for name in muscle_names if base_name(name) not in JAW_MUSCLES]
+    many = {"one": 1, "three": 3, "all": len(names)}[kind.partition("_")[0]]
+    out = []
+    for _ in range(count):
+        values = {names[k]: rng.uniform() for k in rng.choice(len(names), many, replace=False)}
+        if kind.endswith("_jaw"):
+            values |= {"jaw_open": rng.uniform(), "jaw_forward": rng.uniform(-1, 1), "jaw_side": rng.uniform(-1, 1)}
+        out.append(pose_from(values))
+    return out
+
+
+def errors(rig: Rig, model: Model, poses) -> Work:
+    """(f, n) mm between the rig's skin and the converged simulation's in each pose."""
+    out = np.empty((len(poses), model.count))
+    for number, pose in enumerate(poses):
+        yield Progress(number / len(poses), f"Simulating unseen pose {number + 1} of {len(poses)}")
+        asked = control(model, pose)
+        truth = solve(model, asked, max_iterations=ITERATIONS, tolerance=TOLERANCE).state.skin
+        out[number] = np.linalg.norm(rig.skin(asked) - truth, axis=1)
+    return out
+
+
+def summary(off: np.ndarray) -> dict[str, float]:
+    """rms_mm over all vertices and poses, of the middle and of the worst pose; p95_mm and max_mm of single vertices."""
+    each = np.sqrt((off**2).mean(axis=1))
+    found = {
+        "rms_mm": np.sqrt((off**2).mean()),
+        "median_pose_rms_mm": np.median(each),
+        "worst_pose_rms_mm": each.max(),
+        "p95_mm": np.percentile(off, 95),
+        "max_mm": off.max(),
+    }
+    return {"poses": len(off), **{name: round(float(value), 4) for name, value in found.items()}}
+
+
+def measured(rig: Rig, model: Model, kinds=(*KINDS, "expressions", "arkit"), count: int = 8, seed: int = 1) -> Work:
+    """Kind of pose -> `summary`; ``count`` poses of every kind that is drawn at random, none of them a sample."""
+    report = {}
+    for number, kind in enumerate(kinds):
+        poses = unseen_poses(model.muscle_names, kind, count, np.random.default_rng([seed, number]))
+        off = yield from portion(errors(rig, model, poses), number / len(kinds), (number + 1) / len(kinds))
+        report[kind] = summary(off)
+    return report

@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The response rig: the skin of a head in any pose within a millisecond, learnt from the simulation.
+
+Inputs become forces and progress of the muscles (`spending`). The skin's own motion (`jaw_frame`) is linear in the
+forces plus a smooth function of the progress: kernel ridge regression with a Matérn 5/2 kernel (Rasmussen and Williams
+2006, 4.17 and 2.25), region by region, each seeing only what moves it, in principal modes of what it does. At rest all
+terms vanish: the neutral face is exactly the scan.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ..tissue.structures import Control
+from .inputs import CENTRES, inputs_of
+from .jaw_frame import JawFrame
+from .spending import Spending
+
+LENGTH = 2.0  # of the kernel, in the scaled coordinates of each region
+
+
+def matern(squared: np.ndarray) -> np.ndarray:
+    """Matérn 5/2 of squared distances (any shape), 1 at 0."""
+    far = np.sqrt(5 * np.maximum(squared, 0.0)) / LENGTH
+    return (1 + far + far * far / 3) * np.exp(-far)
+
+
+@dataclass(frozen=True, eq=False)
+class Region:
+    """Skin that is moved by the same: vertices (v,), and what its m modes are by kernel and force.
+
+    weights (s, m) over the samples' kernels; linear (p, m) over the forces; modes (m, 3 v) mm
+    """
+
+    vertices: np.ndarray
+    weights: np.ndarray
+    linear: np.ndarray
+    modes: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Rig:
+    """muscle_names of the head; sphincters: which of the k muscles that pull on skin are the lips' (-1: none); g regions.
+
+    scale (g, p) weights of the progress coordinates, 0 where a region does not feel an input; samples (s, p) the progress
+    coordinates of the poses it was learnt from
+    """
+
+    muscle_names: tuple[str, ...]
+    spending: Spending
+    frame: JawFrame
+    sphincters: tuple[int, int]
+    scale: np.ndarray
+    samples: np.ndarray
+    regions: tuple[Region, ...]
+
+    @cached_property
+    def _centres(self) -> np.ndarray:
+        """(g, p, s) the samples as each region sees them."""
+        return np.ascontiguousarray((self.samples[None] * self.scale[:, None]).transpose(0, 2, 1))
+
+    @cached_property
+    def _distance(self) -> tuple[np.ndarray, np.ndarray]:
+        """(g, 1, s) squared distance of each sample from rest, and its kernel with rest."""
+        size = (self._centres**2).sum(axis=1)[:, None]
+        return size, matern(size)
+
+    def skin(self, control: Control) -> np.ndarray:
+        """(n, 3) mm, the skin in a pose."""
+        return self.frame.placed(self.own(self.inputs(control)[None])[0], control.jaw)
+
+    def inputs(self, control: Control) -> np.ndarray:
+        """(p,) the inputs of a control."""
+        return inputs_of(self.muscle_names, control)
+
+    def own(self, inputs: np.ndarray) -> np.ndarray:
+        """(f, n, 3) mm: the skin's own motion for f rows of inputs (f, p)."""
+        forces, progress = (x.astype(np.float32) for x in coordinates(self.spending, self.sphincters, inputs))
+        out = np.zeros((len(inputs), len(self.frame.rest), 3), np.float32)
+        for region, kernel in zip(self.regions, self._kernels(progress), strict=True):
+            moved = (kernel @ region.weights + forces @ region.linear) @ region.modes
+            out[:, region.vertices] = moved.reshape(len(inputs), -1, 3)
+        return out
+
+    def _kernels(self, progress: np.ndarray) -> np.ndarray:
+        """(g, f, s) kernel of every pose with every sample as each region sees them, less what either has with rest."""
+        at = progress[None] * self.scale[:, None]
+        here = (at**2).sum(axis=2)[..., None]
+        there, rest = self._distance
+        return matern(here + there - 2 * (at @ self._centres)) - matern(here) * rest
+
+
+def coordinates(spending: Spending, sphincters, inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """What the skin is linear in (f, p) and what it bends with (f, p): forces and progress, each followed by the other
+    inputs. Forces count 1 for a muscle alone at its end. A muscle that has no entries in the tissue (of a lid) stays."""
+    k = len(spending.mutual)
+    activation, others = inputs[:, :k], inputs[:, k:].copy()
+    forces, progress = spending.forces(activation, others)
+    for at, muscle in zip(CENTRES, sphincters, strict=True):
+        if muscle < 0:
+            continue
+        left = forces[:, muscle] / np.maximum(activation[:, muscle], 1e-6)
+        others[:, at] *= np.where(activation[:, muscle] > 1e-6, left, 1.0)
+    own = np.diag(spending.mutual)
+    without = ~spending.mutual.any(axis=1)
+    progress = np.where(without, activation, progress)
+    return np.concatenate([forces * (1 + own), others], axis=1), np.concatenate([progress, others], axis=1)
