@@ -13,8 +13,10 @@ from dataclasses import dataclass, field, fields, is_dataclass, replace
 import numpy as np
 
 from .energy import Pose, energy_gradient, find_contacts, load_at, pose_of
+from .planes import Planes
 from .solver import descend, factorised, solve
 from .structures import Control, Model, State
+from .surroundings import Surroundings
 
 #: Where the first stage lies in a step, and the share of the step over which either is implicit.
 GAMMA = 1 - np.sqrt(0.5)
@@ -27,11 +29,12 @@ ROUNDS, TOLERANCE, LONGEST = 12, 0.05, 1 / 24
 
 @dataclass(eq=False)
 class Memory:
-    """What a step leaves to the next of the same dt: pairs of L-BFGS, the pose at its end, and the mm of its last
-    quasi-Newton step (of all nodes the farthest)."""
+    """What a step leaves to the next of the same dt: pairs of L-BFGS, pose and contacts of its second stage,
+    and the mm of its last quasi-Newton step (of all nodes the farthest)."""
 
     pairs: list = field(default_factory=list)
     pose: Pose | None = None
+    planes: Planes | None = None
     residual: float = 0.0
 
 
@@ -56,20 +59,23 @@ def step(
     memory = Memory() if memory is None else memory
     last = memory.pose
     if last is None and before is not None:
-        last = pose_of(model, before)
+        last = _posed(model, before)
     part = GAMMA * dt
     x, v = state.positions, state.velocities
-    between = pose = pose_of(model, control)
+    between = pose = _posed(model, control)
     middle = control
     if before is not None:
         middle = control_between(before, control, GAMMA)
-        between = pose_of(model, middle)
-    first = _stage(model, middle, between, x, v, carried(x, last, between), part, memory, rounds, tolerance)
+        between = _posed(model, middle)
+    # contacts are looked for once a step: the first stage, a third of a step on, has those of the stage before
+    start = carried(x, last, between)
+    first = _stage(model, middle, between, x, v, start, memory.planes, part, memory, rounds, tolerance)
     velocity = (first - x) / part
     rate = (velocity - v) / part
     ahead = (1 - GAMMA) * dt
     x, v = x + ahead * velocity, v + ahead * rate
-    second = _stage(model, control, pose, x, v, carried(first, between, pose), part, memory, rounds, tolerance)
+    start = carried(first, between, pose)
+    second = _stage(model, control, pose, x, v, start, None, part, memory, rounds, tolerance)
     memory.pose = pose
     velocities = np.zeros_like(second)
     free = model.cache["matrix"]["free"]
@@ -98,8 +104,9 @@ def moving(model: Model, controls, dt: float, first: State | None = None):
         before = control
 
 
-def _stage(model, control, pose, here, velocity, start, dt, memory, rounds, tolerance):
-    """(3 n, 3) mm: the nodes after an implicit Euler step of ``dt`` from ``here`` with ``velocity``."""
+def _stage(model, control, pose, here, velocity, start, planes, dt, memory, rounds, tolerance):
+    """(3 n, 3) mm: the nodes after an implicit Euler step of ``dt`` from ``here`` with ``velocity``. Contacts are looked for
+    where no ``planes`` are given."""
     free = model.cache["matrix"]["free"]
     p = model.parameters
     if not control.around.idle:
@@ -111,7 +118,8 @@ def _stage(model, control, pose, here, velocity, start, dt, memory, rounds, tole
     goal = here[free] + heavy * dt / pull * velocity[free]
     positions = pose.reference.copy()
     positions[free] = start[free]
-    planes = find_contacts(model, pose, positions)
+    if planes is None:
+        planes = memory.planes = find_contacts(model, pose, positions)
 
     def value(x):
         energy, gradient = energy_gradient(model, pose, planes, x)
@@ -122,6 +130,11 @@ def _stage(model, control, pose, here, velocity, start, dt, memory, rounds, tole
     factor = factorised(model, dt)
     positions, _, memory.residual, _ = descend(value, factor, free, positions, memory.pairs, rounds, tolerance, _TRUST)
     return positions
+
+
+def _posed(model, control):
+    """The pose of a control, without what acts from outside: that depends on where the nodes are."""
+    return pose_of(model, control if control.around.idle else replace(control, around=Surroundings()))
 
 
 def carried(positions, before: Pose | None, after: Pose) -> np.ndarray:

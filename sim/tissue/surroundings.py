@@ -47,16 +47,20 @@ class Surroundings:
 def apparent_acceleration(around: Surroundings, positions, velocities=None) -> np.ndarray:
     """(k, 3) mm/s²: what masses at ``positions`` (k, 3) mm that move by ``velocities`` (k, 3) mm/s feel beyond the gravity
     of the scan's posture."""
-    w = np.asarray(around.spin, float)
-    felt = (around.gravity - STANDARD_GRAVITY) - around.acceleration
-    felt = np.tile(felt, (len(positions), 1))
-    if np.any(around.spin_rate):
-        felt -= np.cross(around.spin_rate, positions)
-    if np.any(w):
-        felt -= np.cross(w, np.cross(w, positions))
-        if velocities is not None:
-            felt -= 2 * np.cross(w, velocities)
+    spin, rate = _cross(around.spin), _cross(around.spin_rate)
+    field = rate + spin @ spin
+    felt = np.tile((around.gravity - STANDARD_GRAVITY) - around.acceleration, (len(positions), 1))
+    if field.any():
+        felt -= positions @ field.T
+    if spin.any() and velocities is not None:
+        felt -= velocities @ (2 * spin.T)
     return felt
+
+
+def _cross(v) -> np.ndarray:
+    """(3, 3), the matrix of the cross product with ``v`` (3,)."""
+    x, y, z = np.asarray(v, float)
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
 def wind_force(wind, normals, area) -> np.ndarray:
