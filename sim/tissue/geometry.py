@@ -5,6 +5,8 @@ import numpy as np
 from scipy import sparse
 from scipy.spatial import cKDTree
 
+TIE = 1e-6  # mm within which distances are equal
+
 
 def closest_on_triangles(points, a, b, c):
     """Closest points (k, 3) on triangles with corners a, b, c (k, 3), one triangle per point (Ericson 2004, 5.1.5)."""
@@ -58,7 +60,8 @@ class Surface:
         self.tries = min(tries, len(triangles))
 
     def closest(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Points (k, 3) on the surface, triangle (k,) and distance (k,) mm."""
+        """Points (k, 3) on the surface, triangle (k,) and distance (k,) mm; the middle of points that are equally near, so that
+        the plane of symmetry of a symmetric head keeps to no side."""
         _, near = self.tree.query(points, self.tries)
         near = near.reshape(len(points), -1)
         flat = np.repeat(points, near.shape[1], axis=0)
@@ -67,7 +70,9 @@ class Surface:
         distance = np.linalg.norm(found - flat, axis=1).reshape(near.shape)
         best = np.argmin(distance, axis=1)
         row = np.arange(len(points))
-        return found.reshape(*near.shape, 3)[row, best], near[row, best], distance[row, best]
+        alike = (distance <= distance[row, best][:, None] + TIE)[..., None]
+        point = (alike * found.reshape(*near.shape, 3)).sum(axis=1) / alike.sum(axis=1)
+        return point, near[row, best], np.linalg.norm(point - points, axis=1)
 
 
 def vertex_areas(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
