@@ -24,7 +24,7 @@ GAMMA = 1 - np.sqrt(0.5)
 _TRUST = 0.5
 #: What `moving` asks of a stage: quasi-Newton steps at most, and the mm at which fewer do. Its frames are parted into steps
 #: of at most this many seconds.
-ROUNDS, TOLERANCE, LONGEST = 12, 0.05, 1 / 24
+ROUNDS, TOLERANCE, LONGEST = 12, 0.1, 1 / 24
 
 
 @dataclass(eq=False)
@@ -66,7 +66,8 @@ def step(
     middle = control
     if before is not None:
         middle = control_between(before, control, GAMMA)
-        between = _posed(model, middle)
+        # lids go straight for a third of a step: their turn is too short to bend
+        between = _posed(model, middle, last.lid_goal + GAMMA * (pose.lid_goal - last.lid_goal))
     # contacts are looked for once a step: the first stage, a third of a step on, has those of the stage before
     start = carried(x, last, between)
     first = _stage(model, middle, between, x, v, start, memory.planes, part, memory, rounds, tolerance)
@@ -132,9 +133,10 @@ def _stage(model, control, pose, here, velocity, start, planes, dt, memory, roun
     return positions
 
 
-def _posed(model, control):
+def _posed(model, control, lid_goal=None):
     """The pose of a control, without what acts from outside: that depends on where the nodes are."""
-    return pose_of(model, control if control.around.idle else replace(control, around=Surroundings()))
+    inner = control if control.around.idle else replace(control, around=Surroundings())
+    return pose_of(model, inner, lid_goal)
 
 
 def carried(positions, before: Pose | None, after: Pose) -> np.ndarray:
@@ -148,6 +150,8 @@ def carried(positions, before: Pose | None, after: Pose) -> np.ndarray:
 
 def control_between(one, other, share: float):
     """The control (or what it holds) ``share`` of the way from ``one`` to ``other``."""
+    if share in (0, 1):
+        return other if share else one
     if is_dataclass(one):
         parts = {f.name: control_between(getattr(one, f.name), getattr(other, f.name), share) for f in fields(one)}
         return replace(other, **parts)

@@ -64,8 +64,8 @@ def posed_reference(model: Model, rotation, translation) -> np.ndarray:
     return moved
 
 
-def pose_of(model: Model, control: Control) -> Pose:
-    """The constants of a solve for ``control``."""
+def pose_of(model: Model, control: Control, lid_goal: np.ndarray | None = None) -> Pose:
+    """The constants of a solve for ``control``; ``lid_goal`` (v, 3) mm as in `Pose` where it is known already."""
     rotation, translation = jaw_transform(model.jaw, *control.jaw)
     reference = posed_reference(model, rotation, translation)
     m = model.muscles
@@ -81,13 +81,14 @@ def pose_of(model: Model, control: Control) -> Pose:
     air = model.pressure
     puff = float(np.clip(control.cheeks, -1, 1))
     blown = len(air.column) if puff else 0
-    lid_node, lid_goal, lid_stiffness = [], [], []
-    for lids, closure in zip(model.lids, _lids_of(model, control), strict=True):
-        goal = lid_targets(lids, closure[0], closure[1], control.gaze_of(lids.side))
-        lid_node.append(lids.column)
-        lid_goal.append(goal + _lid_offset(model, lids))
-        lid_stiffness.append(lids.hold)
-    none = np.zeros((0, 3))
+    if lid_goal is None:
+        goals = [
+            lid_targets(lids, closure[0], closure[1], control.gaze_of(lids.side)) + _lid_offset(model, lids)
+            for lids, closure in zip(model.lids, _lids_of(model, control), strict=True)
+        ]
+        lid_goal = np.concatenate([*goals, np.zeros((0, 3))])
+    lid_node = np.concatenate([*(lids.column for lids in model.lids), np.zeros(0, int)])
+    lid_hold = np.concatenate([*(lids.hold for lids in model.lids), np.zeros(0)])
     return Pose(
         reference=reference,
         rotation=rotation,
@@ -96,9 +97,9 @@ def pose_of(model: Model, control: Control) -> Pose:
         pull=np.concatenate([direction, np.sign(puff) * air.direction[:blown]]),
         push=np.concatenate([push[on], abs(puff) * air.strength * air.weight[:blown]]),
         reach=np.concatenate([m.reach[m.owner[on]], np.full(blown, air.reach)]),
-        lid_node=np.concatenate(lid_node) if lid_node else np.zeros(0, int),
-        lid_goal=np.concatenate(lid_goal) if lid_goal else none,
-        lid_stiffness=model.parameters.lid * np.concatenate(lid_stiffness) if lid_stiffness else np.zeros(0),
+        lid_node=lid_node,
+        lid_goal=lid_goal,
+        lid_stiffness=model.parameters.lid * lid_hold,
         gaze=np.array([control.gaze_of(side) for side in "lr"]),
         seal=float(np.clip(control.seal, 0, 1)),
         load=load_at(model, control.around, reference),
