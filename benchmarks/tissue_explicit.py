@@ -1,104 +1,79 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The face of Lee, Terzopoulos and Waters 1995 in motion: what its explicit steps cost as the tissue gets stiffer, beside
-the implicit steps of our own solver in the same run; and how far behind its muscles it is.
+"""Explicit integration of the very same springs, masses and forces as our own model's: symplectic Euler (Lee, Terzopoulos
+and Waters 1995, 3.9 is explicit Euler, which is less stable) at the largest step that stays stable.
 
-    python benchmarks/tissue_explicit.py [--stiffness 1 100 1000] [--frames 3]
-
-A smile is switched on at rest and followed for some frames of 1/24 s. All of the stiffness (springs, volume, shape,
-restoration) and the muscles' strength are multiplied. Seconds are of the processor. The lag is the peak of the skin's
-motion over two periods of a smile that comes and goes, in shares of the smile held still. Prints tables and, on the last
-line, the same as JSON.
+Steps that many frames would need are not all made: some are, and the frame's time is theirs times the steps it takes.
 """
 
-import argparse
-import json
-import time
-from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
+from scipy import sparse
+from scipy.sparse.linalg import eigsh
+from tissue_clip import FRAME, Clock
 
-from headshop.sim.acting.expressions import expressions
-from headshop.sim.acting.pose import control
-from headshop.sim.anatomy.storage import load_head
-from headshop.sim.tissue import model as ours
-from headshop.sim.tissue.dynamics import step as implicit_step
-from headshop.sim.tissue.lee1995 import model as lee
-from headshop.sim.tissue.lee1995 import solver as lee_solver
-from headshop.sim.tissue.lee1995.constants import DEFAULT
-from headshop.sim.tissue.solver import rest_state
+from headshop.sim.tissue.dynamics import control_between
+from headshop.sim.tissue.energy import energy_gradient, find_contacts, pose_of
 
-FRAME = 1 / 24
-SCALED = (
-    *("epidermis", "dermal_fatty", "dermal_fatty_stiff", "fascia", "muscle_layer"),
-    *("volume", "shape", "restoration"),
-)
+CONTACTS = 24  # times a frame that contacts are looked for (the implicit steps do so twice)
+TRIAL = 150  # steps that a time step must survive
 
 
-def per_frame(step, rest, model, wanted, frames):
-    """Processor seconds per frame after the first, and how far the skin's peak has come by the last, mm."""
-    state = step(model, rest, wanted, FRAME)
-    begin = time.process_time()
-    for _ in range(frames):
-        state = step(model, state, wanted, FRAME)
-    seconds = (time.process_time() - begin) / frames
-    return seconds, float(np.linalg.norm(state.skin - rest.skin, axis=1).max())
+class Explicit:
+    """Nodes of ``model`` on their way from ``state``; `frame` takes them through a frame."""
+
+    def __init__(self, model, state):
+        self.model = model
+        self.free = model.cache["matrix"]["free"]
+        self.mass = model.mass[self.free][:, None] / model.parameters.dynamic_scale
+        self.x, self.v = state.positions.copy(), state.velocities[self.free].copy()
+
+    def frame(self, before, after, dt: float, most: int | None = None) -> int:
+        """The steps made towards the control ``after`` a frame later: all, or ``most`` of them."""
+        count = int(np.ceil(FRAME / dt))
+        every = max(1, count // CONTACTS)
+        done = count if most is None else min(most, count)
+        for k in range(done):
+            if k % every == 0:
+                pose = pose_of(self.model, control_between(before, after, (k + every) / count))
+                held = np.setdiff1d(np.arange(len(self.x)), self.free)
+                self.x[held] = pose.reference[held]
+                planes = find_contacts(self.model, pose, self.x)
+            _, gradient = energy_gradient(self.model, pose, planes, self.x)
+            self.v -= FRAME / count * (gradient / self.mass + self.model.parameters.damping_rate * self.v)
+            self.x[self.free] += FRAME / count * self.v
+            if k % 10 == 0 and not np.abs(self.v).max() < 1e6:
+                return 0
+        return done if np.isfinite(self.x).all() else 0
 
 
-def lag(model, wanted, hertz):
-    """The skin's peak, mm, while activations go as a raised cosine for two periods."""
-    state, peak = lee_solver.rest_state(model), 0.0
-    rest = state.skin
-    for k in range(int(round(2 / hertz / FRAME))):
-        share = 0.5 - 0.5 * np.cos(2 * np.pi * hertz * (k + 1) * FRAME)
-        state = lee_solver.step(model, state, replace(wanted, activations=share * wanted.activations), FRAME)
-        peak = max(peak, float(np.linalg.norm(state.skin - rest, axis=1).max()))
-    return peak
+def largest_step(model, state, controls) -> float:
+    """s: from what the largest rate of the springs at rest allows, by factors of 1.3 to what survives `TRIAL` steps."""
+    free = model.cache["matrix"]["free"]
+    root = sparse.diags(np.sqrt(model.parameters.dynamic_scale / model.mass[free]))
+    rate = eigsh(root @ model.cache["matrix"]["system"] @ root, k=1, tol=1e-2, return_eigenvectors=False)[0]
+    dt = 4 / np.sqrt(rate)
+    with np.errstate(all="ignore"):  # most steps tried blow up
+        while not Explicit(model, state).frame(*controls[:2], dt, TRIAL):
+            dt /= 1.3
+    return float(dt)
 
 
-def main():
-    """Measure, print."""
-    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("--stiffness", nargs="+", type=float, default=[1, 100, 1000])
-    parser.add_argument("--frames", type=int, default=3)
-    options = parser.parse_args()
-    head = load_head()
-    own = ours.build_model(head)
-    smile = expressions()["smile"]
-    rows, face = [], None
-    print(f"{'stiffness':>9}{'step':>10}{'steps/s':>9}{'explicit':>12}{'implicit':>12}{'ratio':>8}")
-    for factor in options.stiffness:
-        constants = replace(DEFAULT, **{k: factor * getattr(DEFAULT, k) for k in SCALED})
-        model = lee.build_model(head, constants)
-        face = model if factor == 1 else face
-        explicit, reached = per_frame(
-            lee_solver.step, lee_solver.rest_state(model), model, control(model, smile), options.frames
-        )
-        parameters = replace(own.parameters, dynamic_scale=factor * own.parameters.dynamic_scale)
-        stiff = replace(own, parameters=parameters, cache={"matrix": own.cache["matrix"]})
-        implicit, _ = per_frame(implicit_step, rest_state(own), stiff, control(own, smile), options.frames)
-        steps = int(np.ceil(FRAME / model.time_step)) / FRAME
-        rows.append(
-            {
-                "stiffness": factor,
-                "time_step_s": model.time_step,
-                "explicit_s_per_frame": explicit,
-                "implicit_s_per_frame": implicit,
-                "reached_mm": reached,
-            }
-        )
-        print(
-            f"{factor:9g}{model.time_step * 1e3:7.3f} ms{steps:9.0f}{explicit * 1e3:9.0f} ms{implicit * 1e3:9.0f} ms"
-            f"{explicit / implicit:7.1f}x"
-        )
-    lags = {}
-    if face is not None:
-        wanted = control(face, smile)
-        still = lee_solver.solve(face, wanted).diagnostics["peak_mm"]
-        for hertz in (0.25, 1.0, 2.5):
-            lags[hertz] = lag(face, wanted, hertz) / still
-            print(f"smile at {hertz:4.2f} Hz: {100 * lags[hertz]:3.0f} % of its motion when held")
-    print(json.dumps({"rows": rows, "lag": lags}))
+def measured(model, state, controls, most: int = 200) -> dict:
+    """What a frame costs, by ``most`` steps of it."""
+    dt = largest_step(model, state, controls)
+    with Clock() as clock:
+        done = Explicit(model, state).frame(controls[0], controls[1], dt, most)
+    count = int(np.ceil(FRAME / dt))
+    share = count / max(done, 1)
+    return {"cpu_s": clock.cpu * share, "elapsed_s": clock.elapsed * share, "steps": count, "made": done, "dt_s": dt}
 
 
-if __name__ == "__main__":
-    main()
+def path(model, state, controls) -> list:
+    """The skin at the end of every frame after the first, all steps made: the truth in time."""
+    nodes, out = Explicit(model, state), []
+    dt = largest_step(model, state, controls) / 1.3
+    for before, after in pairwise(controls):
+        nodes.frame(before, after, dt)
+        out.append(nodes.x[: model.count].copy())
+    return out
