@@ -14,6 +14,7 @@ from . import head_place, heads, performance, shape_keys
 from .provenance import timed, versions
 
 SETS = ("expressions", "muscles", "arkit")
+RIG = "rig"  # a set of sliders that play the simulation together, instead of poses
 
 
 def poses_of_set(skin: bpy.types.Object, name: str) -> tuple[dict, dict]:
@@ -30,13 +31,13 @@ def poses_of_set(skin: bpy.types.Object, name: str) -> tuple[dict, dict]:
         names = [muscle.name for muscle in head.muscles]
         poses, over = (arkit.poses(), arkit.over()) if name == "arkit" else (expressions.expressions(), {})
         return {key: expressions.for_head(pose, names) for key, pose in poses.items()}, over
-    raise InputError(f"The set {name} is not in this version: bake --set {', '.join(SETS)}.")
+    raise InputError(f"The set {name} is not in this version: bake --set {', '.join((*SETS, RIG))}.")
 
 
 def bake(
     skin: bpy.types.Object, pose_set: str | None = None, acted=None, model: str = DEFAULT, dynamics: bool = False
 ) -> Work:
-    """Bake a set of poses, a performance (`sim.acting.performance`), or both, by a model (`sim.acting.models`).
+    """Bake a set of poses or the rig, a performance (`sim.acting.performance`), or both, by a model (`sim.acting.models`).
 
     dynamics : whether the tissue swings in the performance, or rests in every frame
 
@@ -46,7 +47,14 @@ def bake(
     seconds = dict(report.get("seconds", {}))
     border = 1.0 if acted is None else 0.5
     shapes = acting = None
-    if pose_set is not None:
+    if pose_set == RIG:
+        from .response import require_own_model
+        from .rig_keys import bake_rig
+
+        require_own_model(model)
+        with timed(seconds, "bake_rig"):
+            report["rig"] = yield from portion(bake_rig(skin), 0.0, border)
+    elif pose_set is not None:
         with timed(seconds, f"bake_{pose_set}"):
             poses, over = poses_of_set(skin, pose_set)
             shapes = yield from portion(shape_keys.bake_poses(skin, poses, model, over), 0.0, border)
@@ -55,7 +63,7 @@ def bake(
             work = bake_acted(skin, acted, None, model, dynamics)
             acting = yield from portion(work, 0.0 if pose_set is None else border, 1.0)
     if shapes is not None:
-        report["shapes"] = shape_keys.baked_report(skin)
+        report["shapes"] = {name: row for name, row in shape_keys.baked_report(skin).items() if "converged" in row}
     if acting is not None:
         report["performance"] = acting
     report["seconds"] = seconds
@@ -90,6 +98,9 @@ def bake_acted(
 def summary(report: dict) -> str:
     """A sentence of what was baked."""
     said = []
+    if report.get("rig"):
+        rig = report["rig"]
+        said.append(f"a rig of {rig['sliders']} sliders and {rig['driven']} driven shape keys")
     if report.get("shapes"):
         worst = max(shape["penetration_mm"] for shape in report["shapes"].values())
         settled = sum(shape["converged"] for shape in report["shapes"].values())

@@ -16,7 +16,7 @@ from ..sim.errors import InputError
 
 INTERRUPTED = 130
 RELAX = ("auto", "always", "never")
-SETS = ("muscles", "facs", "arkit", "expressions")
+SETS = ("muscles", "facs", "arkit", "expressions", "rig")
 
 
 class _Parser(argparse.ArgumentParser):
@@ -65,7 +65,8 @@ def parser() -> argparse.ArgumentParser:
     landmarks.add_argument("-o", "--output", required=True, metavar="FILE")
 
     bake = command("bake", "Simulate poses or a performance into shape keys.", chosen, plain)
-    bake.add_argument("--set", choices=SETS, dest="poses", help="simulate each pose of a set into a shape key")
+    sets = "simulate each pose of a set into a shape key; rig: sliders that play the simulation together, by drivers"
+    bake.add_argument("--set", choices=SETS, dest="poses", help=sets)
     bake.add_argument("--performance", metavar="FILE", help="simulate a performance into shape key animation")
     about = "with the performance, let flesh swing, and feel the head's motion and gusts of wind"
     bake.add_argument("--dynamic", action="store_true", help=about)

@@ -10,7 +10,7 @@ from pathlib import Path
 import bpy
 
 from ..sim.errors import InputError
-from . import heads
+from . import heads, shape_keys
 from .outputs import Outputs
 from .quiet import quiet
 
@@ -147,6 +147,8 @@ def _copy(obj, lent: list) -> bpy.types.Object:
         if keys.animation_data is not None:
             for curve in list(keys.animation_data.drivers):
                 keys.animation_data.drivers.remove(curve)
+        for key in shape_keys.driven_names(obj):
+            copy.shape_key_remove(keys.key_blocks[key])
         if _LIVE in keys.key_blocks:
             copy.shape_key_remove(keys.key_blocks[_LIVE])
     return copy

@@ -41,7 +41,7 @@ def bake_poses(skin: bpy.types.Object, poses: dict[str, Pose], model: str = DEFA
     """
     acting = model_named(model)
     require_editable(skin)
-    _refuse_foreign(skin, poses)
+    refuse_foreign(skin, poses)
     yield Progress(0.0, "Building the tissue")
     head = heads.read_head(skin)
     built = acting.build(head)
@@ -93,10 +93,19 @@ def require_editable(skin: bpy.types.Object) -> None:
 
 
 def baked_names(obj: bpy.types.Object) -> list[str]:
-    """The shape keys of an object that a bake made, in the order of the object's keys."""
-    keys = obj.data.shape_keys
-    ours = baked_report(obj)
-    return [block.name for block in keys.key_blocks if block.name in ours] if keys else []
+    """The shape keys of an object that a bake made and that are poses, in the order of the object's keys."""
+    return [name for name, report in _there(obj).items() if not report.get("driven")]
+
+
+def driven_names(obj: bpy.types.Object) -> list[str]:
+    """The shape keys of a baked rig that only drivers move (`rig_keys`)."""
+    return [name for name, report in _there(obj).items() if report.get("driven")]
+
+
+def _there(obj: bpy.types.Object) -> dict[str, dict]:
+    """Name -> report of our shape keys, in the order of the object's keys."""
+    keys, ours = obj.data.shape_keys, baked_report(obj)
+    return {block.name: ours[block.name] for block in keys.key_blocks if block.name in ours} if keys else {}
 
 
 def baked_report(obj: bpy.types.Object) -> dict[str, dict]:
@@ -107,7 +116,8 @@ def baked_report(obj: bpy.types.Object) -> dict[str, dict]:
         return {}
 
 
-def _refuse_foreign(skin, names) -> None:
+def refuse_foreign(skin: bpy.types.Object, names) -> None:
+    """Raise `InputError` if an artist has a shape key of his own by one of the ``names``."""
     for obj in heads.parts_of(skin).values():
         keys, ours = obj.data.shape_keys, baked_report(obj)
         foreign = [name for name in names if keys and name in keys.key_blocks and name not in ours]

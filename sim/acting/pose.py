@@ -21,7 +21,7 @@ CONTROLS = (
 GAZE_REACH = np.radians([35.0, 25.0])
 
 #: Lid closure by a fully contracted muscle: share of the rest opening, (upper lid, lower lid).
-_LID_WORK = {
+LID_WORK = {
     "levator_palpebrae": (-0.32, 0.0),
     "orbicularis_oculi_palpebral": (0.22, 2.6),
     "orbicularis_oculi_lacrimal": (0.03, 0.1),
@@ -31,14 +31,14 @@ _LID_WORK = {
 }
 #: Jaw motion by fully contracted muscles of both sides: (open, forward); one side alone also moves the jaw sideways,
 #: away from it. Closers pull against opening.
-_JAW_WORK = {
+JAW_WORK = {
     "digastricus": (0.45, 0.0),
     "pterygoideus_lateralis": (0.15, 0.6),
     "masseter": (-0.5, 0.05),
     "temporalis": (-0.4, -0.05),
     "pterygoideus_medialis": (-0.3, 0.1),
 }
-_SIDE_WORK = 0.6
+SIDE_WORK = 0.6
 
 
 @dataclass(frozen=True)
@@ -106,7 +106,7 @@ def control(model: Model, pose: Pose) -> Control:
 
     opening, forward, aside = float(pose.jaw_open), float(pose.jaw_forward), float(pose.jaw_side)
     closing = 0.0
-    for base, (opens, ahead) in _JAW_WORK.items():
+    for base, (opens, ahead) in JAW_WORK.items():
         both = (of(base, "l") + of(base, "r")) / 2
         if opens > 0:
             opening += opens * both
@@ -114,11 +114,11 @@ def control(model: Model, pose: Pose) -> Control:
             closing += opens * both
         forward += ahead * both
         if base == "pterygoideus_lateralis":
-            aside += _SIDE_WORK * (of(base, "r") - of(base, "l"))
+            aside += SIDE_WORK * (of(base, "r") - of(base, "l"))
     opening = np.clip(opening + closing * max(opening, 0.0), 0.0, 1.0)  # closers can only undo an opening
     lids = np.zeros((2, 2))
     for k, (side, blink) in enumerate((("l", pose.blink_l), ("r", pose.blink_r))):
-        lids[k] = sum(of(base, side) * np.array(work) for base, work in _LID_WORK.items())
+        lids[k] = sum(of(base, side) * np.array(work) for base, work in LID_WORK.items())
         shut = float(np.clip(blink, 0, 1))
         lids[k] = lids[k] * (1 - shut) + shut
     gaze = np.clip([pose.gaze_x, pose.gaze_z], -1, 1)

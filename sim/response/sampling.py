@@ -28,6 +28,8 @@ _EYES += ("levator_palpebrae", "auricularis", "occipitalis")
 #: How often a mixture uses every muscle of a place at once, a control at all, the jaw open, and each sphincter of the
 #: lips and its centre: what lips do against each other and the teeth is the hardest to learn.
 _CROWD, _OFTEN, _OPEN, _LIPS = 0.15, 0.3, 0.55, 0.45
+#: How often both sides do the same, as they do in most expressions.
+_ALIKE = 0.35
 #: Channels drawn a little beyond their end and clipped, so that the end itself is seen often.
 _BEYOND = 1.15
 
@@ -85,6 +87,9 @@ def mixed_pose(muscle_names, rng: np.random.Generator) -> Pose:
             continue
         low = -_BEYOND if name in SIGNED else 0.0
         values[name] = float(np.clip(rng.uniform(low, _BEYOND), -1, 1))
+    if rng.uniform() < _ALIKE:
+        values = {name: value for name, value in values.items() if not name.endswith("_r")}
+        values |= {name[:-2] + "_r": value for name, value in values.items() if name.endswith("_l")}
     return pose_from(values)
 
 
