@@ -5,7 +5,6 @@ Simulated models are cached here, one per skin, and made anew when the head they
 the scene (undo, reload, sculpting). The sliders are the truth; the cache and the shape key only follow.
 """
 
-import zlib
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
@@ -16,7 +15,7 @@ from bpy.app.handlers import persistent
 
 from ..sim.acting.models import model_named
 from ..sim.errors import InputError
-from . import bridge, dependencies, heads, jobs, muscle_names
+from . import bridge, dependencies, heads, jobs, muscle_names, response
 
 KEY = "Live"
 #: Solver iterations for one look while a slider is dragged or the time line plays, and for each round of the timer that
@@ -24,11 +23,27 @@ KEY = "Live"
 LOOK, ROUND, REST = 10, 25, 60
 #: The timer stops when a round moves no vertex by more than this (mm), or after so many rounds.
 VISIBLE, ROUNDS = 0.05, 12
-#: `HEADSHOP_PG_object.model` -> the name of a model that keeps up with a slider.
-MODELS = {"SIMULATED": "headshop", "DIRECT": "waters"}
+#: `HEADSHOP_PG_object.model` -> the name of a model that keeps up with a slider; instant, where it was not
+#: prepared.
+MODELS = {"SIMULATED": "headshop", "INSTANT": "headshop", "DIRECT": "waters"}
 STILL = 0.001  # mm: a part that never moved more needs no key
 
 _depth = 0  # > 0 while nothing must follow
+
+
+class _Instant:
+    """Acts by what was learnt of the simulation (`response`): as `sim.acting.models.ActingModel` does."""
+
+    def rest_state(self, model):
+        """The head itself."""
+        return model.rest_state()
+
+    def look(self, model, control, state, rounds):
+        """The pose, at rest at once."""
+        return model.state(control), True
+
+
+INSTANT = _Instant()
 
 
 @dataclass
@@ -114,6 +129,11 @@ def rest(skin) -> None:
     _following.pop(skin.session_uid, None)
 
 
+def forget(skin) -> None:
+    """What acts for a head has changed: look for it again at the next slider."""
+    _following.pop(skin.session_uid, None)
+
+
 def follow(skin, depsgraph=None) -> None:
     """Bring the head to where its sliders say; does nothing while paused, switched off, or not a head."""
     if _depth or not heads.is_skin(skin) or not skin.headshop.live or skin.library or skin.mode != "OBJECT":
@@ -188,27 +208,20 @@ def _current(skin, moving: bool) -> _Following | None:
     keys = skin.data.shape_keys
     if not moving and (keys is None or KEY not in keys.key_blocks):
         return None
-    mark = fingerprint(skin)
+    mark = response.fingerprint(skin)
     following = _following.get(skin.session_uid)
-    acting = model_named(MODELS[skin.headshop.model])
+    instant = skin.headshop.model == "INSTANT" and response.is_current(skin, mark)
+    acting = INSTANT if instant else model_named(MODELS[skin.headshop.model])
     if following is not None and (following.fingerprint, following.acting) == (mark, acting):
         return following
     from ..sim.acting.pose import Pose, control
     from ..sim.tissue.posing import posed_parts
 
-    model = acting.build(heads.read_head(skin))
+    model = response.acted(skin, mark) if instant else acting.build(heads.read_head(skin))
     state = acting.rest_state(model)
     following = _Following(acting, mark, model, posed_parts(model, state, control(model, Pose())), state)
     _following[skin.session_uid] = following
     return following
-
-
-def fingerprint(skin) -> int:
-    """A number that changes when the head's rest shape or anatomy does."""
-    mark = zlib.crc32(str(skin.get(heads.ANATOMY, "")).encode())
-    for obj in heads.parts_of(skin).values():
-        mark = zlib.crc32(np.ascontiguousarray(bridge.read_positions(obj)).tobytes(), mark)
-    return mark
 
 
 def _write(skin, obj, delta):
@@ -232,8 +245,10 @@ def _on_frame(scene, depsgraph=None):
 @persistent
 def _on_history(*_):
     """After undo, redo or loading a file the cache may speak of other heads; the fingerprint decides."""
-    for following in _following.values():
+    for number, following in list(_following.items()):
         following.pose = None
+        if following.acting is INSTANT:  # what was learnt may be another now
+            del _following[number]
     for skin in heads.find_heads(bpy.context.scene):
         follow(skin)
 

@@ -39,8 +39,9 @@ DETAIL = (
 
 #: What moves the face under the sliders.
 MODELS = (
-    ("SIMULATED", "Simulated", "Tissue that muscles pull on comes to rest; what a bake keeps"),
-    ("DIRECT", "Direct", "Muscles displace the skin itself (Waters 1987); at once, a preview"),
+    ("SIMULATED", "Simulated", "Tissue that muscles pull on comes to rest; what a bake keeps", "NONE", 0),
+    ("INSTANT", "Instant", "What was learnt of the simulation when the preview was prepared; at once", "NONE", 2),
+    ("DIRECT", "Direct", "Muscles displace the skin itself (Waters 1987); at once, a preview", "NONE", 1),
 )
 
 

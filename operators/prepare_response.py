@@ -39,6 +39,7 @@ class HEADSHOP_OT_prepare_response(Job, bpy.types.Operator):
     def finish(self, context, result):
         """Let the sliders use it."""
         skin = active.skin(context)
+        live.forget(skin)
         skin.headshop.model = "INSTANT"
         live.follow(skin)
         _, accuracy = result

@@ -24,6 +24,7 @@ class HEADSHOP_PT_bake(SidebarPanel, bpy.types.Panel):
         column = layout.column(align=True)
         column.operator("headshop.bake_expressions", text="Expressions to Shape Keys", icon="SHAPEKEY_DATA")
         column.operator("headshop.bake_muscles", text="Muscles to Shape Keys", icon="SHAPEKEY_DATA")
+        column.operator("headshop.bake_rig", text="Rig of Sliders to Shape Keys", icon="DRIVER")
         column = layout.column(align=True)
         settings = skin.headshop
         bake = column.operator("headshop.bake_performance", text="Keyed Sliders to Animation", icon="ACTION")

@@ -3,7 +3,7 @@
 
 import bpy
 
-from ..headshop_addon import active, heads, muscle_names
+from ..headshop_addon import active, heads, muscle_names, response
 from .common import SidebarPanel, hint, progress
 
 
@@ -26,6 +26,11 @@ class HEADSHOP_PT_muscles(SidebarPanel, bpy.types.Panel):
         row = layout.row(align=True)
         row.active = skin.headshop.live
         row.prop(skin.headshop, "model", expand=True)
+        if skin.headshop.model == "INSTANT":
+            if not response.is_prepared(skin):
+                hint(layout, context, "Simulated until it was prepared once.")
+            text = "Prepare Again" if response.is_prepared(skin) else "Prepare Instant Preview"
+            layout.operator("headshop.prepare_response", text=text, icon="FILE_REFRESH")
         row = layout.row(align=True)
         row.operator("headshop.key_sliders", text="Key All", icon="KEY_HLT")
         row.operator("headshop.reset_muscles", icon="LOOP_BACK")

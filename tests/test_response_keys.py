@@ -166,3 +166,68 @@ def test_a_rig_is_taken_off_again_and_spares_the_artists_keys(bpy, chosen, refer
         finish(rig_keys.bake_rig(skin))
     with pytest.raises(InputError, match="not prepared"):
         response.stored(skin)
+
+
+def _kept(skin, learnt):
+    from headshop.headshop_addon import response
+
+    skin[response.RESPONSE] = storage.to_bytes(learnt, {"one": {"rms_mm": 0.05}})
+    skin[response.OF] = f"{response.fingerprint(skin):08x}"
+
+
+def test_sliders_play_what_was_learnt(addon, learnt, reference):
+    """Instant: the face is the rig's; where the head was reshaped since, the simulation moves it as before."""
+    from headshop.headshop_addon import bridge, heads, live, response
+
+    heads.create_head(reference, "Fran")
+    skin = heads.find_heads()[0]
+    skin.headshop.model = "INSTANT"
+    assert not response.is_prepared(skin) and not response.is_current(skin)
+    _kept(skin, learnt)
+    live.set_sliders(skin, {ZYGOMATICUS: 0.8, "jaw_open": 0.3})
+    acting = actor_of(learnt, reference)
+    asked = control(acting, Pose({ZYGOMATICUS: 0.8}, jaw_open=0.3))
+    np.testing.assert_allclose(bridge.read_positions(skin, live.KEY), learnt.skin(asked), atol=0.01)
+    mandible = heads.parts_of(skin)["mandible"]
+    assert np.abs(bridge.read_positions(mandible, live.KEY) - reference.parts["mandible"].vertices).max() > 5
+    live.set_sliders(skin, {})
+    np.testing.assert_allclose(bridge.read_positions(skin, live.KEY), reference.skin.vertices, atol=1e-4)
+    assert live._following[skin.session_uid].acting is live.INSTANT
+    moved = reference.skin.vertices.copy()
+    moved[:5] += 1.0
+    bridge.write_positions(skin, moved)
+    assert response.is_prepared(skin) and not response.is_current(skin)
+    with pytest.raises(InputError, match="reshaped"):
+        response.stored(skin)
+    live.set_sliders(skin, {ZYGOMATICUS: 0.5})
+    assert live._following[skin.session_uid].acting is not live.INSTANT
+
+
+def test_what_was_learnt_is_appended_with_the_head(bpy, learnt, reference, tmp_path):
+    from headshop.headshop_addon import heads, response
+
+    heads.create_head(reference, "Fran")
+    _kept(heads.find_heads()[0], learnt)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "head.blend"), copy=True)
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    with bpy.data.libraries.load(str(tmp_path / "head.blend")) as (_, wanted):
+        wanted.objects = ["Fran Skin"]
+    bpy.context.scene.collection.objects.link(bpy.data.objects["Fran Skin"])
+    skin = heads.find_heads()[0]
+    rig, accuracy = response.stored(skin)
+    assert accuracy == {"one": {"rms_mm": 0.05}}
+    asked = control(actor_of(learnt, reference), Pose({LEVATOR: 0.5}))
+    np.testing.assert_allclose(rig.skin(asked), learnt.skin(asked), atol=0.01)
+
+
+def test_a_cancelled_preparation_leaves_no_trace(bpy, reference, reference_model, monkeypatch):
+    from headshop.headshop_addon import heads, response
+
+    monkeypatch.setattr("headshop.sim.response.build.build_model", lambda head: reference_model)
+    heads.create_head(reference, "Fran")
+    skin = heads.find_heads()[0]
+    work = response.prepare(skin, "quick")
+    steps = [next(work) for _ in range(4)]
+    work.close()
+    assert steps[-1].label.startswith("Simulating pose") and 0 < steps[-1].fraction < 0.1
+    assert not response.is_prepared(skin) and response.OF not in skin
