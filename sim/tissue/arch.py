@@ -42,6 +42,16 @@ class Arch:
         radial = np.concatenate([rel / far[:, None], np.zeros((len(rel), 1))], axis=1)
         return np.arctan2(rel[:, 0], -rel[:, 1]), far, radial
 
+    def before(self, points):
+        """mm from the axis (k,) of ``points`` (k, 3), and the wall there."""
+        angle, far, _ = self.coordinates(points)
+        return far, self.wall(angle, points[:, 2])[0]
+
+    def crest(self, points):
+        """(k,) mm: the wall's largest radius at any height, in the direction of ``points`` (k, 3)."""
+        angle = self.coordinates(points)[0]
+        return self.radius.max(axis=1)[np.floor((angle + np.pi) / (2 * np.pi) * _ANGLES).astype(int) % _ANGLES]
+
     def wall(self, angle, height):
         """Radius of the wall (k,), its slope over the angle and over the height.
 
@@ -100,11 +110,10 @@ def build_arches(head: Head, layers: Layers) -> tuple[Arch, ...]:
         arch.radius[:] = np.where(crest > 0, np.maximum(arch.radius, crest - 3.0), 0.0)
         column = np.flatnonzero(near_mouth & (np.linalg.norm(head.skin.vertices[:, :2] - centre, axis=1) < 75))
         skin = head.skin.vertices[column]
-        angle, far, _ = arch.coordinates(skin)
         # at any height: what stands in front of the row where it is highest is in front of it
-        ahead = arch.radius.max(axis=1)[np.floor((angle + np.pi) / (2 * np.pi) * _ANGLES).astype(int) % _ANGLES]
+        far, wall = arch.before(skin)
+        ahead = arch.crest(skin)
         in_front = (ahead > 0.6 * arch.radius.max()) & (far > ahead - 1.5)
-        wall, _, _ = arch.wall(angle, skin[:, 2])
         clearance = np.minimum(far - np.where(wall > 0, wall, ahead), _CLEARANCE)
         arches.append(
             Arch(centre, low[2], high[2], arch.radius, column[in_front], clearance[in_front], "lower" in part)
@@ -116,23 +125,7 @@ def arch_contacts(surfaces, positions, rotation, translation) -> Planes:
     """Planes that keep lips, cheeks and mouth bag in front of the teeth; the lower row moves with the mandible."""
     node, normal, level = [], [], []
     for arch in surfaces.arches:
-        points = positions[arch.column]
-        if arch.lower:
-            points = (points - translation) @ rotation
-        angle, far, radial = arch.coordinates(points)
-        wall, over_angle, over_height = arch.wall(angle, points[:, 2])
-        keep = (wall > 0) & (far < wall + 4.0)
-        if not keep.any():
-            continue
-        angle, far, radial, wall = angle[keep], far[keep], radial[keep], wall[keep]
-        tangent = np.stack([np.cos(angle), np.sin(angle), np.zeros(len(angle))], axis=1)
-        slope = np.clip(over_angle[keep] / far, -0.7, 0.7)
-        rise = np.clip(over_height[keep], -0.7, 0.7)
-        n = radial - slope[:, None] * tangent - rise[:, None] * [0.0, 0, 1]
-        n /= np.linalg.norm(n, axis=1, keepdims=True)
-        missing = (wall + arch.clearance[keep] - far) * np.einsum("ij,ij->i", n, radial)
-        if arch.lower:
-            n = n @ rotation.T
+        keep, n, missing = wall_planes(arch, positions[arch.column], arch.clearance, rotation, translation)
         node.append(arch.column[keep])
         normal.append(n)
         level.append(np.einsum("ij,ij->i", positions[arch.column[keep]], n) + missing)
@@ -140,3 +133,21 @@ def arch_contacts(surfaces, positions, rotation, translation) -> Planes:
         return empty_planes()
     node, normal, level = (np.concatenate(x) for x in (node, normal, level))
     return Planes(node, normal, level, np.full(len(node), -1))
+
+
+def wall_planes(arch: Arch, points, clearance, rotation, translation, reach: float = 4.0):
+    """The wall as tangent planes before ``points`` (k, 3): rows (c,) of those nearer than ``reach`` mm or behind it,
+    normals (c, 3) and mm (c,) by which each is to go on along its normal to keep its ``clearance`` (k,) mm."""
+    if arch.lower:
+        points = (points - translation) @ rotation
+    angle, far, radial = arch.coordinates(points)
+    wall, over_angle, over_height = arch.wall(angle, points[:, 2])
+    keep = np.flatnonzero((wall > 0) & (far < wall + reach))
+    angle, far, radial, wall = angle[keep], far[keep], radial[keep], wall[keep]
+    tangent = np.stack([np.cos(angle), np.sin(angle), np.zeros(len(angle))], axis=1)
+    slope = np.clip(over_angle[keep] / np.maximum(far, 1.0), -0.7, 0.7)
+    rise = np.clip(over_height[keep], -0.7, 0.7)
+    n = radial - slope[:, None] * tangent - rise[:, None] * [0.0, 0, 1]
+    n /= np.linalg.norm(n, axis=1, keepdims=True)
+    missing = (wall + clearance[keep] - far) * np.einsum("ij,ij->i", n, radial)
+    return keep, n @ rotation.T if arch.lower else n, missing

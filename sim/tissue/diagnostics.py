@@ -3,29 +3,31 @@
 
 import numpy as np
 
-from . import contact
-from .lids import depth_in_eyeballs
-from .planes import depths
+from .clearing import surfaces_of
+from .planes import depths, row_depths
 from .structures import Model
 from .volume import prism_volumes
 
 
-def diagnose(model: Model, pose, positions, planes, energy, residual) -> dict:
-    """residual mm, energy, volume_drift (share of the prisms' volume), penetration_mm (deepest, skin with eyeball,
-    teeth and lips), bone_penetration_mm (fascia with bone), inverted_prisms, peak_mm (largest skin motion)."""
+def diagnose(model: Model, pose, positions, energy, residual) -> dict:
+    """residual mm, energy, volume_drift (share of the prisms' volume) and the same of each region, penetration_mm (the
+    deepest of all pairs of surfaces), penetration of each pair (`clearing.PAIRS`), inverted_prisms, peak_mm (largest
+    skin motion)."""
     n = model.count
     volume = prism_volumes(positions, model.prisms) if len(model.prisms) else np.ones(1)
     rest = model.prism_volume if len(model.prisms) else np.ones(1)
-    fascia = positions[n : 2 * n]
-    bone = contact.bone_planes(model.contacts.bones, model.layers, fascia, pose.rotation, pose.translation)
     moved = np.linalg.norm(positions[:n] - model.layers.nodes[:n], axis=1)
-    eye = depth_in_eyeballs(model.lids, positions, pose.gaze_of)
+    pairs = {
+        name: float(max(depths(planes, positions).max(initial=0.0), row_depths(planes, positions).max(initial=0.0)))
+        for name, planes in surfaces_of(model, pose, positions).items()
+    }
     return {
         "residual": float(residual),
         "energy": float(energy),
         "volume_drift": float(volume.sum() / rest.sum() - 1),
-        "penetration_mm": float(max(depths(planes, positions).max(initial=0.0), eye)),
-        "bone_penetration_mm": float(depths(bone, positions).max(initial=0.0)),
+        "penetration_mm": max(pairs.values()),
+        "bone_penetration_mm": pairs["fascia_skull"],
+        "penetration_of": pairs,
         "inverted_prisms": int((volume <= 0).sum()),
         "peak_mm": float(moved.max(initial=0.0)),
     }

@@ -12,12 +12,13 @@ import numpy as np
 from scipy import sparse
 
 from ..mesh import vertex_normals
-from . import arch, contact
+from . import contact
 from .axes import per_axis
+from .drawn_contact import drawn_contacts
 from .jaw import jaw_transform
 from .lids import lid_targets
 from .muscle_field import turned_lips
-from .planes import Planes, contact_energy, joined
+from .planes import Planes, contact_energy, joined, row_energy
 from .seal import seal_energy
 from .springs import spring_forces
 from .structures import Control, Model
@@ -192,6 +193,10 @@ def energy_gradient(model: Model, pose: Pose, planes: Planes, positions) -> tupl
     e, other = contact_energy(planes, positions, model.parameters.contact * model.parameters.epidermis)
     energy += e
     other = other.T
+    if planes.rows is not None:
+        e, g = row_energy(planes, positions, model.parameters.contact * model.parameters.epidermis)
+        energy += e
+        other[:, : len(g)] += g.T
     # muscles: force push (1 - progress / reach), spent at reach; contraction is progress along the fibre's direction
     if len(pose.node):
         progress = np.einsum("ij,ij->i", positions[pose.node] - pose.reference[pose.node], pose.pull)
@@ -228,15 +233,10 @@ def _add(total, node, values):
 def find_contacts(model: Model, pose: Pose, positions) -> Planes:
     """The planes that matter near ``positions`` (3 n, 3)."""
     n = model.count
-    skin, rest = positions[:n], model.layers.nodes[:n]
-    triangles = model.contacts.triangles
-    normals = vertex_normals(skin, triangles)
-    if "rest_normals" not in model.cache:
-        model.cache["rest_normals"] = vertex_normals(rest, triangles)
+    skin = positions[:n]
+    normals = vertex_normals(skin, model.contacts.triangles)
     return joined(
         contact.bone_planes(model.contacts.bones, model.layers, positions[n : 2 * n], pose.rotation, pose.translation),
-        *(contact.eye_planes(lids, skin, pose.gaze_of(lids.side)) for lids in model.lids),
-        arch.arch_contacts(model.contacts, skin, pose.rotation, pose.translation),
         contact.sheet_contacts(model.contacts, normals),
-        contact.lip_contacts(model.contacts, skin, normals, rest, model.cache["rest_normals"]),
+        drawn_contacts(model.drawn, skin, normals, pose.rotation, pose.translation, pose.gaze_of),
     )

@@ -12,6 +12,7 @@ from scipy.spatial import cKDTree
 from ..anatomy.head import Head
 from ..mesh import vertex_normals
 from .geometry import Surface, cotangent_stiffness, short_diagonals, smoothed, vertex_areas
+from .gingiva import ATTACHED, attached
 from .parameters import Parameters
 from .structures import Layers
 
@@ -93,7 +94,10 @@ def build_layers(head: Head, parameters: Parameters) -> Layers:
     face = groups.get("face", np.ones(n))
     restoration = parameters.restoration_area * area * smoothed(factor, stiffness, area, 3.0)
     restoration = restoration * (1 + 12 * np.clip(1 - face, 0, 1) ** 2)
+    gum, below = attached(head)
+    restoration += gum * ATTACHED * parameters.restoration_area * area
     jaw = groups.get("jaw", np.zeros(n))
+    jaw = jaw + gum * (below - jaw)
     mandible = np.where(bony, nearer.astype(float), jaw)
     movable = face > 0.02
     for muscle in head.muscles:  # and where muscles of scalp and ears end

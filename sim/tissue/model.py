@@ -9,6 +9,7 @@ import numpy as np
 from ..anatomy.head import JAW_PARTS, Head
 from . import calibration
 from .contact import build_surfaces
+from .drawn_contact import build_drawn
 from .energy import system_matrix
 from .geometry import cotangent_stiffness, short_diagonals
 from .layers import build_layers, sheet_ties
@@ -49,6 +50,8 @@ def build_model(head: Head, parameters: Parameters = DEFAULT, table: dict | None
     area = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1) / 2
     kept = moving & (volume > 0.4 * area)  # a mean height of 0.4 mm
     laplacian = cotangent_stiffness(layers.nodes[:n], triangles)
+    lids = tuple(x for x in (build_lids(head, layers, side) for side in "lr") if x is not None)
+    contacts = build_surfaces(head, layers, ties)
     model = Model(
         parameters=parameters,
         layers=layers,
@@ -59,8 +62,9 @@ def build_model(head: Head, parameters: Parameters = DEFAULT, table: dict | None
         muscles=build_muscle_field(head, layers, table),
         seal=build_seal(head, layers),
         pressure=build_pressure(head, layers, parameters),
-        lids=tuple(x for x in (build_lids(head, layers, side) for side in "lr") if x is not None),
-        contacts=build_surfaces(head, layers, ties),
+        lids=lids,
+        contacts=contacts,
+        drawn=build_drawn(head, layers, contacts.arches, lids),
         jaw=head.jaw,
         eyes=head.eyes,
         faces=head.skin.faces,

@@ -2,8 +2,10 @@
 """Contacts as points against planes: their energy, and projection out of what is left."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from scipy import sparse
 
 
 @dataclass(frozen=True, eq=False)
@@ -11,12 +13,16 @@ class Planes:
     """Active contacts: node (c,), normal (c, 3), level (c,): node · normal must not fall under level.
 
     partner (c,) node that carries the plane or -1 (then the plane is fixed); offset for partnered ones.
+    rows (r, 3 m) sparse, or None, and row_level (r,): the same for points between nodes; rows @ positions, node-major and
+    of the first m nodes, must not fall under row_level.
     """
 
     node: np.ndarray
     normal: np.ndarray
     level: np.ndarray
     partner: np.ndarray
+    rows: Any = None
+    row_level: np.ndarray | None = None
 
 
 def empty_planes() -> Planes:
@@ -26,7 +32,24 @@ def empty_planes() -> Planes:
 
 def joined(*planes: Planes) -> Planes:
     """All of them in one table."""
-    return Planes(*(np.concatenate([getattr(p, f) for p in planes]) for f in ("node", "normal", "level", "partner")))
+    tables = (np.concatenate([getattr(p, f) for p in planes]) for f in ("node", "normal", "level", "partner"))
+    between = [p for p in planes if p.rows is not None]
+    if not between:
+        return Planes(*tables)
+    rows = sparse.vstack([p.rows for p in between], format="csr")
+    return Planes(*tables, rows, np.concatenate([p.row_level for p in between]))
+
+
+def touching(node, normal, level) -> Planes:
+    """Contacts of nodes (c,) with fixed planes only."""
+    return Planes(node, normal, level, np.full(len(node), -1))
+
+
+def row_depths(planes: Planes, positions) -> np.ndarray:
+    """(r,) mm of penetration of the points between nodes, 0 where apart."""
+    if planes.rows is None:
+        return np.zeros(0)
+    return np.maximum(planes.row_level - planes.rows @ positions.ravel()[: planes.rows.shape[1]], 0)
 
 
 def depths(planes: Planes, positions) -> np.ndarray:
@@ -53,6 +76,12 @@ def contact_energy(planes: Planes, positions, stiffness: float) -> tuple[float, 
     for axis in range(3):
         gradient[axis] = np.bincount(node, push[:, axis], minlength=len(positions))
     return 0.5 * stiffness * float(depth @ depth), gradient.T
+
+
+def row_energy(planes: Planes, positions, stiffness: float) -> tuple[float, np.ndarray]:
+    """Energy ½ k Σ depth² of the points between nodes, and its gradient over the first m nodes (m, 3)."""
+    depth = row_depths(planes, positions)
+    return 0.5 * stiffness * float(depth @ depth), (planes.rows.T @ (-stiffness * depth)).reshape(-1, 3)
 
 
 def project(planes: Planes, positions, rounds: int = 2) -> np.ndarray:

@@ -9,9 +9,9 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
+from .clearing import cleared
 from .diagnostics import diagnose
 from .energy import energy_gradient, find_contacts, pose_of
-from .planes import Planes, project
 from .structures import Control, Model, Solution, State
 
 MEMORY = 10
@@ -49,11 +49,9 @@ def solve(
         max_iterations,
         tolerance,
     )
-    n = model.count
-    visible = skin_planes(find_contacts(model, pose, positions), n)
-    positions = project(visible, positions)
+    positions = cleared(model, pose, positions)
     result = State(positions, np.zeros_like(positions))
-    report = diagnose(model, pose, positions, visible, energy, residual)
+    report = diagnose(model, pose, positions, energy, residual)
     return Solution(result, residual <= tolerance, residual, iterations, report)
 
 
@@ -96,12 +94,6 @@ def _reference_of(model, bones):
     moved = layers.nodes @ rotation.T + (cb - rotation @ ca)
     w = np.concatenate([layers.jaw, layers.jaw, layers.mandible])[:, None]
     return layers.nodes + w * (moved - layers.nodes)
-
-
-def skin_planes(planes, n):
-    """Those of ``planes`` that keep skin from eyeballs, teeth and other skin."""
-    keep = (planes.node < n) & (planes.partner < n)
-    return Planes(planes.node[keep], planes.normal[keep], planes.level[keep], planes.partner[keep])
 
 
 def factorised(model: Model, dt: float | None = None):

@@ -153,6 +153,7 @@ class Model:
     seal: Any  # seal.Seal
     lids: tuple[Lids, ...]
     contacts: Any  # contact.Surfaces
+    drawn: Any  # drawn_contact.DrawnSurfaces
     jaw: Jaw
     eyes: tuple[Eye, Eye]
     faces: np.ndarray

@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is left of penetration when a pose has come to rest, measured surface by surface, and the skin moved clear of it.
+
+Contact forces leave a little penetration, a wall round a row of teeth is not each tooth, and bone is more than its
+tangent planes. So at the end the drawn surface is held against the solids themselves, and moved out of them by the
+least motion of the vertices that does it.
+"""
+
+import numpy as np
+from scipy.sparse import identity
+from scipy.sparse.linalg import cg
+
+from ..mesh import vertex_normals
+from .drawn_contact import eye_contacts, lip_contacts
+from .drawn_samples import planes_of
+from .planes import empty_planes, joined, project, row_depths, touching
+from .structures import Model
+
+#: Pairs of surfaces whose penetration is told apart.
+PAIRS = ("lip_lip", "lid_eyeball", "skin_teeth", "cheek_gum", "fascia_skull")
+#: mm of penetration that is left alone, and by which the rest is overdone; rounds of looking and moving.
+LEAVE, MORE, ROUNDS = 0.02, 0.02, 12
+#: mm that a point is moved in one round, at most.
+FAR = 0.4
+#: mm between points of the lips that may have gone through each other.
+LIP_REACH = 4.0
+_ENAMEL = 0
+
+
+def surfaces_of(model: Model, pose, positions) -> dict:
+    """Pair of `PAIRS` -> `Planes` of what is nearly in touch at ``positions`` (3 n, 3), as exact as the drawn surface."""
+    n = model.count
+    skin, drawn = positions[:n], model.drawn
+    at = pose.rotation, pose.translation
+    normals = vertex_normals(skin, model.contacts.triangles)
+    found = {
+        "lip_lip": lip_contacts(drawn.fine_lips, skin, normals, 0.0, LIP_REACH),
+        "lid_eyeball": [eye_contacts(before, skin, pose.gaze_of(before.of.side), 0.0) for before in drawn.eyes],
+        "skin_teeth": [],
+        "cheek_gum": [],
+    }
+    points = drawn.mouth.at(skin)
+    for within in drawn.rows_of_teeth:
+        rows, normal, height, material = within.solid.planes(points, *at, reach=2.0)
+        level = np.einsum("ij,ij->i", points[rows], normal) - height + within.kept[rows]
+        for name, chosen in (("skin_teeth", material == _ENAMEL), ("cheek_gum", material != _ENAMEL)):
+            found[name].append((*drawn.mouth.along(rows[chosen], normal[chosen]), level[chosen]))
+    bones = [empty_planes()]
+    for within, column in zip(drawn.bones, drawn.fascia, strict=True):
+        fascia = positions[n + column]
+        rows, normal, height, _ = within.solid.planes(fascia, *at, reach=8.0)
+        level = np.einsum("ij,ij->i", fascia[rows], normal) - height + within.kept[rows]
+        bones.append(touching(n + column[rows], normal, level))
+    return {name: planes_of(pieces, n) for name, pieces in found.items()} | {"fascia_skull": joined(*bones)}
+
+
+def cleared(model: Model, pose, positions) -> np.ndarray:
+    """(3 n, 3) mm: ``positions`` with the drawn skin out of eyeballs, teeth, gums and the other lip, and fascia out of
+    bone."""
+    out = positions.copy()
+    n = model.count
+    for _ in range(ROUNDS):
+        found = surfaces_of(model, pose, out)
+        out = project(found.pop("fascia_skull"), out, rounds=1)
+        planes = joined(*found.values())
+        if planes.rows is None:
+            break
+        depth = row_depths(planes, out)
+        hit = np.flatnonzero(depth > LEAVE)
+        if not len(hit):
+            break
+        move = _least_motion(planes.rows[hit], np.minimum(depth[hit], FAR) + MORE, model.layers.free[:n])
+        size = np.linalg.norm(move, axis=1, keepdims=True)
+        out[:n] += move * np.minimum(1, 2 * FAR / np.maximum(size, 1e-9))
+    return out
+
+
+def _least_motion(rows, wanted, free):
+    """(n, 3) mm, the smallest motion of the ``free`` (n,) vertices by which ``rows @ motion`` (c,) is ``wanted`` (c,)."""
+    rows = rows.multiply(np.repeat(free, 3)[None]).tocsr()
+    normal = rows @ rows.T
+    normal = normal + 0.1 * normal.diagonal().mean() * identity(len(wanted))
+    push = cg(normal, wanted, rtol=1e-3, maxiter=60)[0]
+    # surfaces push, they do not pull
+    return (rows.T @ np.maximum(push, 0)).reshape(-1, 3)
