@@ -46,7 +46,7 @@ def surfaces_of(model: Model, pose, positions) -> dict:
         for name, chosen in (("skin_teeth", material == _ENAMEL), ("cheek_gum", material != _ENAMEL)):
             found[name].append((*drawn.mouth.along(rows[chosen], normal[chosen]), level[chosen]))
     bones = [empty_planes()]
-    for within, column in zip(drawn.bones, drawn.fascia, strict=True):
+    for within, column in zip(drawn.bones, drawn.fascia.values(), strict=True):
         fascia = positions[n + column]
         rows, normal, height, _ = within.solid.planes(fascia, *at, reach=8.0)
         level = np.einsum("ij,ij->i", fascia[rows], normal) - height + within.kept[rows]

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Contact: fascia on skull (Lee, Terzopoulos and Waters 1995, 3.7), lids on eyeball, lips on teeth and lips on lips.
+"""Contact of the layers' own nodes: fascia on skull (Lee, Terzopoulos and Waters 1995, 3.7), lids on eyeball, lips on lips.
 
 3.7 cancels the part of the force that points into the skull, so that tissue slides over bone. The same follows from a
 one-sided spring along the bone's normal, which the solver can minimise. All contacts are points against planes, found
 anew every few steps; a plane that the rest shape already crosses is moved back to it, so that the neutral face stays
-exactly the scan. `project` finally moves skin out of eyeball and teeth whatever is left.
+exactly the scan. Our own model takes bone and lining from here, and looks for the rest on the surface that is drawn
+(`drawn_contact`); the other models know vertices only.
 """
 
 from dataclasses import dataclass

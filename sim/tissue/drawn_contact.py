@@ -76,8 +76,8 @@ def _within(mesh, lower, points, spacing) -> Within:
 @dataclass(frozen=True, eq=False)
 class DrawnSurfaces:
     """teeth, eyes: what may touch them; lips: the two, fine_lips: the same more closely; mouth: points of lips and lining
-    that no gum holds; rigid: part -> mesh of what is solid; nodes (3 n, 3) mm at rest; fascia: columns over skull and over
-    mandible."""
+    that no gum holds; rigid: part -> mesh of what is solid; nodes (3 n, 3) mm at rest; fascia: bone -> columns over
+    it."""
 
     teeth: tuple[Before, ...]
     eyes: tuple[Before, ...]
@@ -86,22 +86,22 @@ class DrawnSurfaces:
     mouth: Samples
     rigid: dict
     nodes: np.ndarray
-    fascia: tuple[np.ndarray, np.ndarray]
+    fascia: dict
 
     @cached_property
     def rows_of_teeth(self) -> tuple[Within, ...]:
         """Both rows of teeth with their gums as solids, made when they are first asked for."""
         names = [name for name in ("teeth_upper", "teeth_lower") if name in self.rigid]
         points = self.mouth.at(self.nodes[: len(self.nodes) // 3])
-        return tuple(_within(self.rigid[name], "lower" in name, points, 0.5) for name in names)
+        return tuple(_within(self.rigid[name], "lower" in name, points, 0.5) for name in names if len(points))
 
     @cached_property
     def bones(self) -> tuple[Within, ...]:
         """Skull and mandible as solids, for the fascia that stands on each."""
         n = len(self.nodes) // 3
-        both = zip(("skull", "mandible"), self.fascia, strict=True)
         return tuple(
-            _within(self.rigid[name], name == "mandible", self.nodes[n + column], 1.0) for name, column in both
+            _within(self.rigid[name], name == "mandible", self.nodes[n + column], 1.0)
+            for name, column in self.fascia.items()
         )
 
 
@@ -133,7 +133,8 @@ def build_drawn(head: Head, layers: Layers, arches: tuple[Arch, ...], lids_of_bo
         eyes.append(Before(lids, seen, np.minimum(gap, CLEAR)))
     rigid = {k: head.parts[k] for k in ("teeth_upper", "teeth_lower", "skull", "mandible") if k in head.parts}
     on_bone = layers.bony & free
-    fascia = tuple(np.flatnonzero(on_bone & ((layers.mandible > 0.5) == lower)) for lower in (False, True))
+    over = {"skull": layers.mandible <= 0.5, "mandible": layers.mandible > 0.5}
+    fascia = {k: np.flatnonzero(on_bone & over[k]) for k in over if k in rigid and (on_bone & over[k]).any()}
     held = lining.rows @ attached(head)[0]
     lips = [(group[k] > 0.3) & free for k in ("lip_upper", "lip_lower")]
     lips = [_lips(faces, skin, lips, spacing) for spacing in (SPACING, FINE)]

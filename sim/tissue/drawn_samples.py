@@ -82,6 +82,8 @@ def drawn_samples(faces: np.ndarray, vertices: np.ndarray, chosen: np.ndarray, s
     faces (m, 4), vertices (n, 3) mm at rest, chosen (n,) bool. First come the chosen vertices' own points.
     """
     n = len(vertices)
+    if not chosen.any():
+        return samples_of(sparse.csr_matrix((0, n)))
     real = faces >= 0
     used = chosen.copy()
     for _ in range(3):  # the rings that the limit over the chosen faces depends on

@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Contact on the surface that is drawn: between its points, lips, teeth, eyeballs and bone keep out of each other."""
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+from headshop.sim.acting.arkit import poses
+from headshop.sim.acting.pose import Pose, control
+from headshop.sim.anatomy.inside import inside
+from headshop.sim.mesh import Mesh
+from headshop.sim.mesh_subdivision import limit, smoother, subdivision
+from headshop.sim.tissue.clearing import PAIRS, cleared, surfaces_of
+from headshop.sim.tissue.drawn_samples import drawn_samples, planes_of
+from headshop.sim.tissue.energy import pose_of
+from headshop.sim.tissue.gingiva import attached
+from headshop.sim.tissue.lids import eyeball_radius
+from headshop.sim.tissue.model import build_model
+from headshop.sim.tissue.planes import row_depths, row_energy
+from headshop.sim.tissue.solids import build_solid
+from headshop.sim.tissue.solver import rest_state, solve
+
+SHOWN = ("eyeBlinkLeft", "mouthRollUpper", "mouthClose", "noseSneerLeft")
+
+
+@pytest.fixture(scope="module")
+def model(reference):
+    return build_model(reference)
+
+
+@pytest.fixture(scope="module")
+def solved(model):
+    return {name: solve(model, control(model, poses()[name]), max_iterations=200) for name in SHOWN}
+
+
+def test_samples_lie_on_the_limit_surface(reference):
+    skin, faces = reference.skin.vertices, reference.skin.faces
+    chosen = np.asarray(reference.groups["lip_upper"]) > 0.5
+    samples = drawn_samples(faces, skin, chosen)
+    fine, quads, _ = subdivision(faces, len(skin), 2)
+    truth = limit(quads, fine.shape[0]) @ (fine @ skin)
+    at = samples.at(skin)
+    assert cKDTree(truth).query(at)[0].max() < 0.01
+    own = smoother(faces, len(skin))[0][: len(skin)] @ skin
+    np.testing.assert_allclose(at[: chosen.sum()], own[chosen], atol=0.01)
+    assert np.allclose(samples.weight.sum(axis=1), 1) and len(samples) > 2 * chosen.sum()
+
+
+def test_a_push_on_a_sample_is_a_push_on_its_vertices(reference):
+    skin = reference.skin.vertices
+    samples = drawn_samples(reference.skin.faces, skin, np.asarray(reference.groups["lip_lower"]) > 0.5)
+    up = np.tile([0.0, 0, 1], (2, 1))
+    height = samples.at(skin)[[3, 8], 2]
+    planes = planes_of([(*samples.along(np.array([3, 8]), up), height + [0.5, -1.0])], len(skin))
+    np.testing.assert_allclose(row_depths(planes, skin), [0.5, 0], atol=1e-9)
+    energy, gradient = row_energy(planes, skin, 4.0)
+    assert energy == pytest.approx(0.5 * 4 * 0.25)
+    # the forces are shared by weight and add up to what the plane exerts
+    np.testing.assert_allclose(gradient.sum(axis=0), [0, 0, -4 * 0.5], atol=1e-9)
+    np.testing.assert_allclose(gradient[:, 2], -2 * samples.rows[3].toarray()[0], atol=1e-9)
+
+
+def _box(low, high):
+    corner = np.array([[x, y, z] for x in (low, high) for y in (low, high) for z in (low, high)], float)
+    faces = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
+    return corner, np.array(faces)
+
+
+def test_a_solid_knows_inside_from_outside_and_no_way_out_within():
+    outer, faces = _box(-5, 5)
+    inner, _ = _box(-2, 2)
+    mesh = Mesh(np.concatenate([outer, inner]), np.concatenate([faces, faces + 8]).astype(np.int32))
+    solid = build_solid(mesh, False, outer)
+    points = np.array([[0, 0, 4.0], [0, 0, 5.5], [5.5, 5.5, 0], [2.1, 0, 0]])
+    rows, normal, height, _ = solid.planes(points, np.eye(3), np.zeros(3), 4.0)
+    assert rows.tolist() == [0, 1, 2, 3]
+    np.testing.assert_allclose(height, [-1, 0.5, 0.5, -2.9], atol=0.15)
+    np.testing.assert_allclose(normal[[0, 3]], [[0, 0, 1], [1, 0, 0]], atol=1e-9)
+
+
+def test_nothing_touches_at_rest(model):
+    x = rest_state(model).positions
+    pose = pose_of(model, control(model, Pose()))
+    for planes in surfaces_of(model, pose, x).values():
+        assert row_depths(planes, x).max(initial=0) < 1e-9
+    np.testing.assert_array_equal(cleared(model, pose, x), x)
+
+
+@pytest.mark.parametrize("name", SHOWN)
+def test_poses_come_out_clear(solved, name):
+    found = solved[name].diagnostics
+    assert found["penetration_of"].keys() == set(PAIRS)
+    assert max(found["penetration_of"].values()) == found["penetration_mm"] < 0.1
+
+
+def test_the_drawn_lids_lie_on_the_ball(model, reference, solved):
+    """All of the limit surface near the eye, not only where the solver looks."""
+    rows = smoother(reference.skin.faces, model.count, 2)[0]
+    for lids in model.lids:
+        points = rows @ solved["eyeBlinkLeft"].state.skin
+        points = points[np.linalg.norm(points - lids.eye.centre, axis=1) < lids.eye.radius + 2]
+        gap = np.linalg.norm(points - lids.eye.centre, axis=1) - eyeball_radius(lids, points, np.zeros(2))
+        assert gap.min() > -0.1
+
+
+def test_no_tooth_is_in_a_rolled_lip(model, reference, solved):
+    lips = np.maximum(reference.groups["lip_upper"], reference.groups["lip_lower"])
+    rows = smoother(reference.skin.faces, model.count)[0]
+    points = (rows @ solved["mouthRollUpper"].state.skin)[rows @ lips > 0.5]
+    for part in ("teeth_upper", "teeth_lower"):
+        mesh = reference.parts[part]
+        lost = points[inside(points, mesh.vertices, mesh.triangles)]
+        assert len(lost) < 4 and all(
+            np.linalg.norm(mesh.vertices[mesh.triangles].mean(axis=1) - p, axis=1).min() < 1.5 for p in lost
+        )
+
+
+def test_gums_take_their_lining_along(model, reference):
+    held, below = attached(reference)
+    rest = reference.skin.vertices
+    asked = control(model, Pose(jaw_open=0.7))
+    moved = solve(model, asked, max_iterations=200).state.skin
+    pose = pose_of(model, asked)
+    firm = held > 0.99
+    assert firm.sum() > 40 and 0 < below[firm].mean() < 1
+    goal = np.where(below[:, None] > 0, rest @ pose.rotation.T + pose.translation, rest)
+    away = np.linalg.norm(moved - goal, axis=1)[firm]
+    assert away.max() < 1 and np.median(away) < 0.1
