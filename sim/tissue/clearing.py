@@ -7,8 +7,6 @@ least motion of the vertices that does it.
 """
 
 import numpy as np
-from scipy.sparse import identity
-from scipy.sparse.linalg import cg
 
 from ..mesh import vertex_normals
 from .drawn_contact import eye_contacts, lip_contacts
@@ -20,8 +18,9 @@ from .structures import Model
 PAIRS = ("lip_lip", "lid_eyeball", "skin_teeth", "cheek_gum", "fascia_skull")
 #: mm of penetration that is left alone, and by which the rest is overdone; rounds of looking and moving.
 LEAVE, MORE, ROUNDS = 0.02, 0.02, 12
-#: mm that a point is moved in one round, at most.
+#: mm that a point is moved in one round, at most; steps to find out how.
 FAR = 0.4
+SWEEPS = 20
 #: mm between points of the lips that may have gone through each other.
 LIP_REACH = 4.0
 _ENAMEL = 0
@@ -62,24 +61,32 @@ def cleared(model: Model, pose, positions) -> np.ndarray:
     for _ in range(ROUNDS):
         found = surfaces_of(model, pose, out)
         out = project(found.pop("fascia_skull"), out, rounds=1)
-        planes = joined(*found.values())
-        if planes.rows is None:
+        move = way_out(joined(*found.values()), out, model.layers.free[:n])
+        if move is None:
             break
-        depth = row_depths(planes, out)
-        hit = np.flatnonzero(depth > LEAVE)
-        if not len(hit):
-            break
-        move = _least_motion(planes.rows[hit], np.minimum(depth[hit], FAR) + MORE, model.layers.free[:n])
-        size = np.linalg.norm(move, axis=1, keepdims=True)
-        out[:n] += move * np.minimum(1, 2 * FAR / np.maximum(size, 1e-9))
+        out[:n] += move
     return out
 
 
+def way_out(planes, positions, free, kept: float = 0.0) -> np.ndarray | None:
+    """(n, 3) mm by which the ``free`` (n,) vertices move so that what is drawn leaves the ``planes`` it is in by more than
+    ``kept`` mm, or None where it is in none; one round, of no more than 2 `FAR`."""
+    depth = row_depths(planes, positions) - kept
+    hit = np.flatnonzero(depth > LEAVE)
+    if not len(hit):
+        return None
+    move = _least_motion(planes.rows[hit], np.minimum(depth[hit], FAR) + MORE, free)
+    size = np.linalg.norm(move, axis=1, keepdims=True)
+    return move * np.minimum(1, 2 * FAR / np.maximum(size, 1e-9))
+
+
 def _least_motion(rows, wanted, free):
-    """(n, 3) mm, the smallest motion of the ``free`` (n,) vertices by which ``rows @ motion`` (c,) is ``wanted`` (c,)."""
+    """(n, 3) mm, about the smallest motion of the ``free`` (n,) vertices by which ``rows @ motion`` (c,) is at least
+    ``wanted`` (c,): surfaces push, they do not pull, so by projected Jacobi steps on the pushes."""
     rows = rows.multiply(np.repeat(free, 3)[None]).tocsr()
-    normal = rows @ rows.T
-    normal = normal + 0.1 * normal.diagonal().mean() * identity(len(wanted))
-    push = cg(normal, wanted, rtol=1e-3, maxiter=60)[0]
-    # surfaces push, they do not pull
-    return (rows.T @ np.maximum(push, 0)).reshape(-1, 3)
+    product = (rows @ rows.T).tocsr()
+    size = np.maximum(np.asarray(abs(product).sum(axis=1)).ravel(), 1e-9)
+    push = wanted / size
+    for _ in range(SWEEPS):
+        push = np.maximum(push + (wanted - product @ push) / size, 0)
+    return (rows.T @ push).reshape(-1, 3)

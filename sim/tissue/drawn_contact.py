@@ -178,6 +178,23 @@ def eye_contacts(before: Before, skin, gaze, most: float = CLEAR):
     return *before.points.along(near, normal), normal @ lids.eye.centre + need
 
 
+def on_the_ball(before: Before, skin, gaze, rounds: int = 6) -> np.ndarray:
+    """(v, 3) mm: the lids' vertices of ``skin`` (n, 3) pushed out until what is drawn of them lies on the eyeball: where
+    lids are to go, so that they need not be held off it."""
+    lids, rows = before.of, before.points.rows
+    out = skin.copy()
+    for _ in range(rounds):
+        rel = rows @ out - lids.eye.centre
+        size = np.maximum(np.linalg.norm(rel, axis=1), 1e-9)
+        deep = eyeball_radius(lids, rel + lids.eye.centre, gaze) + before.clearance - size
+        hit = np.maximum(deep, 0)
+        if hit.max(initial=0.0) < 0.02:
+            break
+        share = (rows.T @ np.column_stack([(hit / size)[:, None] * rel, hit > 0]))[lids.column]
+        out[lids.column] += 1.5 * share[:, :3] / np.maximum(share[:, 3:], 0.05)
+    return out[lids.column]
+
+
 def tooth_contacts(before: Before, skin, rotation, translation):
     """Lips and cheeks in front of a row of teeth; a piece for `planes_of`."""
     points = before.points.at(skin)

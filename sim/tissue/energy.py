@@ -14,7 +14,7 @@ from scipy import sparse
 from ..mesh import vertex_normals
 from . import contact
 from .axes import per_axis
-from .drawn_contact import drawn_contacts
+from .drawn_contact import drawn_contacts, on_the_ball
 from .jaw import jaw_transform
 from .lids import lid_targets
 from .muscle_field import turned_lips
@@ -84,8 +84,8 @@ def pose_of(model: Model, control: Control, lid_goal: np.ndarray | None = None) 
     blown = len(air.column) if puff else 0
     if lid_goal is None:
         goals = [
-            lid_targets(lids, closure[0], closure[1], control.gaze_of(lids.side)) + _lid_offset(model, lids)
-            for lids, closure in zip(model.lids, _lids_of(model, control), strict=True)
+            _lid_goal(model, before, closure, control.gaze_of(before.of.side))
+            for before, closure in zip(model.drawn.eyes, _lids_of(model, control), strict=True)
         ]
         lid_goal = np.concatenate([*goals, np.zeros((0, 3))])
     lid_node = np.concatenate([*(lids.column for lids in model.lids), np.zeros(0, int)])
@@ -114,6 +114,13 @@ def load_at(model: Model, around: Surroundings, positions, velocities=None) -> n
         model, around, positions, velocities, lambda: vertex_normals(positions[: model.count], triangles)
     )
     return None if force is None else force.T / model.parameters.dynamic_scale
+
+
+def _lid_goal(model: Model, before, closure, gaze) -> np.ndarray:
+    """(v, 3) mm: where the lids of one eye are to go, what is drawn of them on the eyeball."""
+    skin = model.layers.nodes[: model.count].copy()
+    skin[before.of.column] = lid_targets(before.of, closure[0], closure[1], gaze) + _lid_offset(model, before.of)
+    return on_the_ball(before, skin, gaze)
 
 
 def _lid_offset(model: Model, lids) -> np.ndarray:

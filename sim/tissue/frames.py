@@ -8,9 +8,10 @@ change of the control.
 
 import numpy as np
 
+from .clearing import way_out
+from .drawn_contact import CLEAR
 from .energy import Pose, energy_gradient, find_contacts, pose_of
-from .planes import project
-from .solver import factorised, minimise, rest_state, skin_planes
+from .solver import factorised, minimise, rest_state
 from .structures import Control, Model, State
 
 #: Steps that a frame is given, and the mm of a step at which fewer do.
@@ -59,7 +60,11 @@ class Frames:
         )
         self.converged = self.residual <= tolerance
         self._at = positions
-        positions = project(skin_planes(planes, model.count), positions)
+        # contact keeps a little off: what is nearer has not gone through
+        out = way_out(planes, positions, model.layers.free[: model.count], CLEAR)
+        if out is not None:
+            positions = positions.copy()
+            positions[: model.count] += out
         self.state = State(positions, np.zeros_like(positions))
         return self.state
 
