@@ -38,18 +38,18 @@ def surfaces_of(model: Model, pose, positions) -> dict:
         "skin_teeth": [],
         "cheek_gum": [],
     }
-    points = drawn.mouth.at(skin)
     for within in drawn.rows_of_teeth:
+        points = within.points.at(skin)
         rows, normal, height, material = within.solid.planes(points, *at, reach=2.0)
         level = np.einsum("ij,ij->i", points[rows], normal) - height + within.kept[rows]
         for name, chosen in (("skin_teeth", material == _ENAMEL), ("cheek_gum", material != _ENAMEL)):
-            found[name].append((*drawn.mouth.along(rows[chosen], normal[chosen]), level[chosen]))
+            found[name].append((*within.points.along(rows[chosen], normal[chosen]), level[chosen]))
     bones = [empty_planes()]
-    for within, column in zip(drawn.bones, drawn.fascia.values(), strict=True):
-        fascia = positions[n + column]
+    for within in drawn.bones:
+        fascia = positions[n + within.points]
         rows, normal, height, _ = within.solid.planes(fascia, *at, reach=8.0)
         level = np.einsum("ij,ij->i", fascia[rows], normal) - height + within.kept[rows]
-        bones.append(touching(n + column[rows], normal, level))
+        bones.append(touching(n + within.points[rows], normal, level))
     return {name: planes_of(pieces, n) for name, pieces in found.items()} | {"fascia_skull": joined(*bones)}
 
 

@@ -29,6 +29,8 @@ CLEAR, REACH = 0.15, 1.2
 WIDE, DRAPED = 2.4, 5.0
 #: mm between the points of lips at which what is left of penetration is looked for.
 FINE = 0.8
+#: rad from the front, seen from the axis of a row of teeth, within which there are teeth.
+BESIDE = 1.6
 #: mm from the other lip, at rest, that the surface of a lip is looked at, and by which a lip is at
 #: least thick.
 LIP_DEEP, LIP_THIN = 7.0, 1.0
@@ -59,31 +61,32 @@ class Lips:
 
 @dataclass(frozen=True, eq=False)
 class Within:
-    """A `Solid` and the mm (k,) in front of it, at most 0, that points keep because they are no farther at rest."""
+    """A `Solid`, its ``points`` (k, `Samples` of the skin or columns of fascia) that stay out of it, and the mm (k,) in
+    front of it, at most 0, that they keep because they are no farther at rest."""
 
     solid: Solid
+    points: Any
     kept: np.ndarray
 
 
-def _within(mesh, lower, points, spacing) -> Within:
-    solid = build_solid(mesh, lower, points, spacing)
-    kept = np.zeros(len(points))
-    rows, _, height, _ = solid.planes(points, np.eye(3), np.zeros(3))
+def _within(mesh, lower, points, places, spacing) -> Within:
+    solid = build_solid(mesh, lower, places, spacing)
+    kept = np.zeros(len(places))
+    rows, _, height, _ = solid.planes(places, np.eye(3), np.zeros(3))
     kept[rows] = np.minimum(height, 0)
-    return Within(solid, kept)
+    return Within(solid, points, kept)
 
 
 @dataclass(frozen=True, eq=False)
 class DrawnSurfaces:
-    """teeth, eyes: what may touch them; lips: the two, fine_lips: the same more closely; mouth: points of lips and lining
-    that no gum holds; rigid: part -> mesh of what is solid; nodes (3 n, 3) mm at rest; fascia: bone -> columns over
+    """teeth, eyes: what may touch them; lips: the two, fine_lips: the same more closely; rigid: part ->
+    mesh of what is solid; nodes (3 n, 3) mm at rest; fascia: bone -> columns over
     it."""
 
     teeth: tuple[Before, ...]
     eyes: tuple[Before, ...]
     lips: Lips
     fine_lips: Lips
-    mouth: Samples
     rigid: dict
     nodes: np.ndarray
     fascia: dict
@@ -91,16 +94,22 @@ class DrawnSurfaces:
     @cached_property
     def rows_of_teeth(self) -> tuple[Within, ...]:
         """Both rows of teeth with their gums as solids, made when they are first asked for."""
-        names = [name for name in ("teeth_upper", "teeth_lower") if name in self.rigid]
-        points = self.mouth.at(self.nodes[: len(self.nodes) // 3])
-        return tuple(_within(self.rigid[name], "lower" in name, points, 0.5) for name in names if len(points))
+        rest = self.nodes[: len(self.nodes) // 3]
+        out = []
+        for before in self.teeth:
+            # behind the last tooth the lining has grown round the end of the gum
+            points = before.points[np.abs(before.of.coordinates(before.points.at(rest))[0]) < BESIDE]
+            part = "teeth_lower" if before.of.lower else "teeth_upper"
+            if len(points):
+                out.append(_within(self.rigid[part], before.of.lower, points, points.at(rest), 0.5))
+        return tuple(out)
 
     @cached_property
     def bones(self) -> tuple[Within, ...]:
         """Skull and mandible as solids, for the fascia that stands on each."""
         n = len(self.nodes) // 3
         return tuple(
-            _within(self.rigid[name], name == "mandible", self.nodes[n + column], 1.0)
+            _within(self.rigid[name], name == "mandible", column, self.nodes[n + column], 1.0)
             for name, column in self.fascia.items()
         )
 
@@ -114,12 +123,13 @@ def build_drawn(head: Head, layers: Layers, arches: tuple[Arch, ...], lids_of_bo
     mouth = (np.max(list(group.values()), axis=0) > 0.05) & free
     lining = drawn_samples(faces, skin, mouth, WIDE)
     points = lining.at(skin)
+    held = lining.rows @ attached(head)[0]
     teeth = []
     for arch in arches:
         far, wall = arch.before(points)
         # at any height: what stands in front of the row where it is highest is in front of it
         ahead = arch.crest(points)
-        ahead = (ahead > 0.6 * arch.radius.max()) & (far > ahead - 1.5)
+        ahead = (ahead > 0.6 * arch.radius.max()) & (far > ahead - 1.5) & (held < 0.3)
         gap = np.where(wall > 0, far - wall, np.inf)
         teeth.append(Before(arch, lining[ahead], np.minimum(gap[ahead], CLEAR)))
     eyes = []
@@ -135,10 +145,9 @@ def build_drawn(head: Head, layers: Layers, arches: tuple[Arch, ...], lids_of_bo
     on_bone = layers.bony & free
     over = {"skull": layers.mandible <= 0.5, "mandible": layers.mandible > 0.5}
     fascia = {k: np.flatnonzero(on_bone & over[k]) for k in over if k in rigid and (on_bone & over[k]).any()}
-    held = lining.rows @ attached(head)[0]
     lips = [(group[k] > 0.3) & free for k in ("lip_upper", "lip_lower")]
     lips = [_lips(faces, skin, lips, spacing) for spacing in (SPACING, FINE)]
-    return DrawnSurfaces(tuple(teeth), tuple(eyes), *lips, lining[held < 0.3], rigid, layers.nodes, fascia)
+    return DrawnSurfaces(tuple(teeth), tuple(eyes), *lips, rigid, layers.nodes, fascia)
 
 
 def _lips(faces, skin, groups, spacing) -> Lips:

@@ -98,11 +98,17 @@ def drawn_samples(faces: np.ndarray, vertices: np.ndarray, chosen: np.ndarray, s
     at = rows[points] @ vertices[keep]
     corner = points < len(keep)
     corner[corner] = chosen[keep[points[corner]]]
-    # one point in each cell of a grid, a vertex's own rather than one between
-    order = np.argsort(~corner, kind="stable")
-    cell = np.floor(at[order] / spacing).astype(np.int64)
-    _, first = np.unique(cell, axis=0, return_index=True)
-    picked = np.union1d(np.flatnonzero(corner[order]), first)
-    picked = points[order[np.sort(picked)]]
+    # one point in each cell of a grid that is the same on both sides, a vertex's own rather than one between, and of these
+    # the one nearest to the middle of the cell
+    near = at / spacing
+    near[:, 0] = np.abs(near[:, 0])
+    cell = np.floor(near).astype(np.int64)
+    off = np.round(np.linalg.norm(near - cell - 0.5, axis=1), 5)
+    cell[:, 0] = np.where(at[:, 0] < 0, -1 - cell[:, 0], cell[:, 0])
+    order = np.lexsort((off, ~corner))
+    _, first = np.unique(cell[order], axis=0, return_index=True)
+    picked = corner.copy()
+    picked[order[first]] = True
+    picked = np.concatenate([points[corner], points[picked & ~corner]])
     rows = rows[picked].tocoo()
     return samples_of(sparse.csr_matrix((rows.data, (rows.row, keep[rows.col])), (len(picked), n)))

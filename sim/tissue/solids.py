@@ -13,6 +13,7 @@ from scipy.ndimage import binary_closing, binary_dilation, label
 from scipy.spatial import cKDTree
 
 from ..mesh import Mesh
+from .geometry import short_diagonals
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,14 +48,18 @@ class Solid:
 
 def build_solid(mesh: Mesh, lower: bool, about: np.ndarray, spacing: float = 0.5) -> Solid:
     """The solid of ``mesh`` as far as it is within 8 mm of the points ``about`` (k, 3) mm; points ``spacing`` mm apart."""
-    tri = mesh.vertices[mesh.triangles]
+    tri = mesh.vertices[short_diagonals(mesh.vertices, mesh.faces)]
     low, high = about.min(axis=0) - 8, about.max(axis=0) + 8
+    # cells that are the same on both sides
+    high[0] = np.ceil(np.abs([low[0], high[0]]).max() / spacing) * spacing
+    low[0] = -high[0]
     normal = np.cross(tri[:, 1] - tri[:, 0], tri[:, 2] - tri[:, 0])
     size = np.linalg.norm(normal, axis=1)
     used = ((tri.max(axis=1) > low) & (tri.min(axis=1) < high)).all(axis=1) & (size > 1e-9)
     tri, normal = tri[used], normal[used] / size[used, None]
     kind = np.zeros(len(mesh.faces), int) if mesh.material is None else mesh.material
-    kind = np.repeat(kind, 1 + (mesh.faces[:, 3] >= 0))[used]
+    quad = mesh.faces[:, 3] >= 0
+    kind = np.concatenate([kind[~quad], kind[quad], kind[quad]])[used]
     points, owner = _covered(tri, spacing)
     low = low - 2 * spacing
     shape = np.ceil((high - low) / spacing).astype(int) + 3
