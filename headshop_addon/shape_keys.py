@@ -22,13 +22,16 @@ from . import bridge, heads
 SHAPES = "headshop_shapes"
 SCANNED = "Scan"  # the face with the expression that it was scanned with, if that was taken away
 ITERATIONS = 200  # until it rests, not until it looks right
+#: What a model may say of a solve besides, as it is kept in the report of a shape.
+MORE = ("residual", "energy", "volume_drift_of", "penetration_of", "inverted_prisms")
 STILL = 0.001  # mm: a part that moves less gets no key
 
 
 def bake_poses(skin: bpy.types.Object, poses: dict[str, Pose], model: str = DEFAULT, over=None) -> Work:
     """Simulate each pose until it rests and store it as a shape key; returns name -> report.
 
-    A report holds ``model``, ``peak_mm`` (of the surface drawn), ``volume_drift``, ``penetration_mm`` and ``converged``.
+    A report holds ``model``, ``peak_mm`` (of the surface drawn), ``volume_drift``, ``penetration_mm`` and ``converged``, and
+    what else the model says of its solve (`sim.tissue.diagnostics`).
     Nothing is written before all poses are simulated: closing the generator leaves the head as it was.
 
     model : name of the model that acts (`sim.acting.models`)
@@ -75,7 +78,14 @@ def _report(solution, delta: np.ndarray) -> dict:
         "volume_drift": round(float(found["volume_drift"]), 6),
         "penetration_mm": round(float(found["penetration_mm"]), 4),
         "converged": bool(solution.converged),
+        **{name: _rounded(found[name]) for name in MORE if name in found},
     }
+
+
+def _rounded(value):
+    if isinstance(value, dict):
+        return {name: _rounded(each) for name, each in value.items()}
+    return round(value, 6)
 
 
 def keep_as_scanned(skin: bpy.types.Object, vertices: np.ndarray) -> None:

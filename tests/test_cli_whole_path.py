@@ -15,6 +15,7 @@ from headshop.sim.anatomy.seen_skin import seen_skin
 from headshop.sim.scan.ply import read_ply, write_ply
 
 SHAPE = {"model", "peak_mm", "volume_drift", "penetration_mm", "converged"}
+SHAPE |= {"residual", "energy", "volume_drift_of", "penetration_of", "inverted_prisms"}
 
 
 @pytest.fixture(scope="module")

@@ -17,6 +17,7 @@ from headshop.sim.tissue.gingiva import attached
 from headshop.sim.tissue.lids import eyeball_radius
 from headshop.sim.tissue.model import build_model
 from headshop.sim.tissue.planes import row_depths, row_energy
+from headshop.sim.tissue.regions import REGIONS
 from headshop.sim.tissue.solids import build_solid
 from headshop.sim.tissue.solver import rest_state, solve
 
@@ -91,6 +92,16 @@ def test_poses_come_out_clear(solved, name):
     found = solved[name].diagnostics
     assert found["penetration_of"].keys() == set(PAIRS)
     assert max(found["penetration_of"].values()) == found["penetration_mm"] < 0.1
+
+
+def test_volume_is_told_by_region(model, solved):
+    share = np.bincount(model.region, model.prism_volume, minlength=len(REGIONS)) / model.prism_volume.sum()
+    assert len(REGIONS) == 8 and (share > 0.003).all() and share[-1] < 0.5
+    found = solved["eyeBlinkLeft"].diagnostics
+    of = found["volume_drift_of"]
+    assert of.keys() == set(REGIONS) and abs(of["chin"]) < 1e-3 < abs(of["lids"])
+    assert sum(share[k] * of[name] for k, name in enumerate(REGIONS)) == pytest.approx(found["volume_drift"], abs=1e-9)
+    assert all(abs(s.diagnostics["volume_drift"]) < 0.02 for s in solved.values())
 
 
 def test_the_drawn_lids_lie_on_the_ball(model, reference, solved):

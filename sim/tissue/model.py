@@ -17,6 +17,7 @@ from .lids import build_lids
 from .muscle_field import build_muscle_field
 from .parameters import DEFAULT, Parameters
 from .pressure import build_pressure
+from .regions import region_of
 from .seal import build_seal
 from .springs import build_springs
 from .structures import Control, Layers, Model, MuscleField, Solution, Springs, State
@@ -58,6 +59,7 @@ def build_model(head: Head, parameters: Parameters = DEFAULT, table: dict | None
         springs=build_springs(head.skin.faces, layers, parameters, ties),
         prisms=prisms[kept],
         prism_volume=volume[kept],
+        region=region_of(head, triangles[kept]),
         bending=laplacian,
         muscles=build_muscle_field(head, layers, table),
         seal=build_seal(head, layers),

@@ -147,6 +147,7 @@ class Model:
     springs: Springs
     prisms: np.ndarray  # (t, 6) nodes: three of the epidermis, three of the fascia
     prism_volume: np.ndarray  # (t,) mm³ at rest
+    region: np.ndarray  # (t,) number of each prism's region in regions.REGIONS
     bending: Any  # sparse (n, n): Laplacian of a field on the skin, mm^-1 after area weighting
     muscles: MuscleField
     pressure: Pressure
