@@ -26,6 +26,7 @@ from headshop.sim.anatomy.storage import load_head
 from headshop.sim.anatomy.teeth import crowns
 from headshop.sim.mesh_subdivision import smoother
 from headshop.sim.tissue.energy import pose_of
+from headshop.sim.tissue.gingiva import attached
 from headshop.sim.tissue.lids import eyeball_radius
 from headshop.sim.tissue.model import build_model
 from headshop.sim.tissue.solver import rest_state, solve
@@ -46,7 +47,8 @@ class Ruler:
         group = {k: self.rows @ np.asarray(head.groups[k], float) for k in ("lip_upper", "lip_lower", "mouth_bag")}
         self.lips = [np.flatnonzero(group[k] > 0.3) for k in ("lip_upper", "lip_lower")]
         self.patches = [triangles[(group[k] > 0.3)[triangles].all(axis=1)] for k in ("lip_upper", "lip_lower")]
-        self.mouth = np.flatnonzero(np.max(list(group.values()), axis=0) > 0.05)
+        free = self.rows @ attached(head)[0] < 0.3
+        self.mouth = np.flatnonzero((np.max(list(group.values()), axis=0) > 0.05) & free)
         self.teeth = {}
         for part in ("teeth_upper", "teeth_lower"):
             mesh = head.parts[part]
@@ -97,7 +99,7 @@ class Ruler:
         depth = np.full(len(rows), -1.0)
         at = np.flatnonzero(found.found & ~found.border)
         rise = np.einsum("ij,ij->i", skin[rows[at]] - found.points[at], found.normals[at])
-        plain = np.abs(rise) > 0.7 * found.distance[at]
+        plain = np.abs(rise) > 0.9 * found.distance[at]  # round the corner of the mouth lips lie beside each other
         depth[at[plain]] = -rise[plain]
         return depth
 
