@@ -10,7 +10,7 @@ from headshop.sim.tissue.jaw import jaw_transform, opening_mm
 from headshop.sim.tissue.lids import gaze_direction
 from headshop.sim.tissue.muscle_field import fibre_coordinates, theta_1, theta_2
 from headshop.sim.tissue.springs import assemble, spring_energy
-from headshop.sim.tissue.volume import corner_gather, prism_volumes, volume_energy
+from headshop.sim.tissue.volume import corner_gather, prism_volumes, volume_energy, volume_forces
 
 PRISM = np.array([[0, 1, 2, 3, 4, 5]])
 UPRIGHT = np.array([[0.0, 0, 2], [3, 0, 2], [0, 4, 2], [0, 0, 0], [3, 0, 0], [0, 4, 0]])
@@ -139,3 +139,21 @@ def test_closest_points_on_a_triangle():
     surface = Surface(np.array([[0.0, 0, 0], [4, 0, 0], [0, 4, 0]]), np.array([[0, 1, 2]]))
     found, triangle, distance = surface.closest(points)
     assert found == pytest.approx(expected) and distance[0] == pytest.approx(5) and (triangle == 0).all()
+
+
+def test_a_crushed_prism_resists_more():
+    """k1 (V - V_rest) / V_rest, and under a share c of the volume h times k1 (V - c V_rest) / V_rest besides."""
+    x = UPRIGHT.T.copy()
+    rest = prism_volumes(UPRIGHT, PRISM)
+
+    def pressed(share, *crushed):
+        y = x.copy()
+        y[2] *= share
+        return volume_forces(y, PRISM, rest, 3.0, *crushed)
+
+    for share in (1.2, 0.5):
+        assert pressed(share, 0.3, 10.0)[0] == pytest.approx(pressed(share)[0])
+        assert pressed(share, 0.3, 10.0)[1] == pytest.approx(pressed(share)[1])
+    energy, force = pressed(0.1, 0.3, 10.0)
+    assert energy == pytest.approx(0.5 * 3.0 * rest[0] * (0.9**2 + 10 * 0.2**2))
+    assert force == pytest.approx(pressed(0.1)[1] * (0.9 + 10 * 0.2) / 0.9)

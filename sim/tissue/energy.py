@@ -194,7 +194,8 @@ def energy_gradient(model: Model, pose: Pose, planes: Planes, positions) -> tupl
     free = fixed["free"]
     x = np.ascontiguousarray(positions.T)
     energy, force = spring_forces(model.springs, x)
-    e, press = volume_forces(x, model.prisms, model.prism_volume, model.parameters.volume)
+    p = model.parameters
+    e, press = volume_forces(x, model.prisms, model.prism_volume, p.volume, p.crushed, p.hardening)
     energy += e
     gradient = per_axis(fixed["gather"], np.concatenate([force, press], axis=1))
     e, other = contact_energy(planes, positions, model.parameters.contact * model.parameters.epidermis)

@@ -26,6 +26,9 @@ class Parameters:
     element_area: float = 28.0
     #: k1 of 3.6, per mm³ of relative change.
     volume: float = 30.0
+    #: share of its volume under which a prism resists so many times more (own; keeps folds from turning inside out).
+    crushed: float = 0.3
+    hardening: float = 10.0
     #: nodal restoration h of 3.8, per mm² of skin, over bone under `restoration_thickness` mm of tissue.
     restoration_area: float = 0.55
     restoration_thickness: float = 8.0
