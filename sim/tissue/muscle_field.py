@@ -60,7 +60,8 @@ def fibre_coordinates(points, normals, fibre, closed=False):
     away = rel - t[..., None] * segment[None]
     deep = np.einsum("ksj,kj->ks", away, normals)
     side = np.linalg.norm(away - deep[..., None] * normals[:, None], axis=2)
-    best = np.argmin(side**2 + 0.25 * deep**2, axis=1)
+    # rounded: beside a joint both segments are equally near, and a muscle and its mirror image are to choose the same
+    best = np.argmin(np.round(side**2 + 0.25 * deep**2, 9), axis=1)
     row = np.arange(len(points))
     along = start[best] + t[row, best] * length[best]
     direction = -(segment / length[:, None])[best]
