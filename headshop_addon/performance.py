@@ -123,8 +123,8 @@ def _at_rest(acting, built, controls):
 
 def _in_time(acting, built, controls, fps):
     """Yields the state in motion at each of ``controls``, and whether its equations are met."""
-    for state, residual in acting.moving(built, controls, 1 / fps):
-        yield state, residual <= MET
+    for asked, (state, residual) in zip(controls, acting.moving(built, controls, 1 / fps), strict=True):
+        yield acting.cleared(built, asked, state), residual <= MET
 
 
 def write_performance(skin, found: dict, frames: np.ndarray, name: str) -> None:

@@ -20,7 +20,7 @@ def skin(addon, reference, reference_model, monkeypatch):
 
 
 SHAKE = {
-    "jaw_open": ((0.0, 0.0), (0.2, 0.05)),
+    "jaw_open": ((0.0, 0.0), (0.2, 0.01)),
     "head_z": ((0.0, 0.0), (0.08, 40.0), (0.16, 0.0)),
     "head_turn": ((0.0, 0.0), (0.1, 0.3), (0.2, 0.0)),
 }

@@ -54,6 +54,10 @@ class ActingModel:
         """Yields the state and the residual (mm) at each of ``controls``, ``dt`` seconds apart; of models that move."""
         return self._module("dynamics").moving(model, controls, dt)
 
+    def cleared(self, model, control: Control, state):
+        """The state with its skin clear of eyes, teeth and the other lip; of models that move."""
+        return self._module("dynamics").cleared_of(model, control, state)
+
     def _module(self, name: str):
         return import_module(f"..{self.package}.{name}", __package__)
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, fields, is_dataclass, replace
 
 import numpy as np
 
+from .clearing import cleared
 from .energy import Pose, energy_gradient, find_contacts, load_at, pose_of
 from .planes import Planes
 from .solver import descend, factorised, solve
@@ -103,6 +104,11 @@ def moving(model: Model, controls, dt: float, first: State | None = None):
                 )
         yield state, memory.residual
         before = control
+
+
+def cleared_of(model: Model, control: Control, state: State) -> State:
+    """``state`` with the drawn skin moved out of what it is still in: for show, as the motion needs it not."""
+    return replace(state, positions=cleared(model, _posed(model, control), state.positions))
 
 
 def _stage(model, control, pose, here, velocity, start, planes, dt, memory, rounds, tolerance):
