@@ -181,9 +181,10 @@ def eye_contacts(before: Before, skin, gaze, most: float = CLEAR):
     rel = before.points.at(skin) - lids.eye.centre
     size = np.maximum(np.linalg.norm(rel, axis=1), 1e-9)
     near = np.flatnonzero(size < lids.profile.max() + CLEAR + REACH)
-    rel, size = rel[near], size[near]
-    need = eyeball_radius(lids, rel + lids.eye.centre, gaze) + np.minimum(before.clearance[near], most)
-    normal = rel / size[:, None]
+    need = eyeball_radius(lids, rel[near] + lids.eye.centre, gaze) + np.minimum(before.clearance[near], most)
+    close = size[near] < need + REACH
+    near, need = near[close], need[close]
+    normal = rel[near] / size[near, None]
     return *before.points.along(near, normal), normal @ lids.eye.centre + need
 
 

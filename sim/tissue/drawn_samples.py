@@ -7,6 +7,7 @@ A point of the limit surface is a sum of vertices with fixed weights, so a push 
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy import sparse
@@ -41,10 +42,13 @@ class Samples:
     def along(self, which, normal) -> tuple[np.ndarray, np.ndarray]:
         """Columns and values (c, 3 w) of the rows that give the coordinates of points ``which`` (c,) along ``normal``
         (c, 3), of node-major positions."""
-        shape = len(which), 3 * self.node.shape[1]
-        column = self.node[which][:, :, None] * 3 + np.arange(3)
-        value = self.weight[which][:, :, None] * normal[:, None]
-        return column.reshape(shape), value.reshape(shape)
+        value = self.weight[which][:, None] * normal[:, :, None]
+        return self._columns[which], value.reshape(len(which), 3 * self.node.shape[1])
+
+    @cached_property
+    def _columns(self) -> np.ndarray:
+        """(k, 3 w) columns of `along`, axis by axis."""
+        return (self.node[:, None] * 3 + np.arange(3)[:, None]).reshape(len(self), -1).astype(np.int32)
 
 
 def samples_of(rows: sparse.csr_matrix) -> Samples:
@@ -71,7 +75,7 @@ def planes_of(pieces, n: int) -> Planes:
         return none
     column, value, level = (np.concatenate([piece[k].ravel() for piece in pieces]) for k in range(3))
     width = np.concatenate([np.full(len(piece[2]), piece[0].shape[1]) for piece in pieces])
-    start = np.concatenate([[0], np.cumsum(width)])
+    start = np.concatenate([[0], np.cumsum(width)]).astype(np.int32)
     rows = sparse.csr_matrix((value, column, start), (len(level), 3 * n))
     return Planes(none.node, none.normal, none.level, none.partner, rows, level)
 

@@ -38,6 +38,7 @@ class Frames:
         self.state = rest_state(model)
         self.residual, self.iterations, self.converged = 0.0, 0, True
         self._pairs = []
+        self._looks = self._lid_goal = None
         self._at = self._goal = self._asked = None  # where the nodes were, were expected, and the control as mm
         self._off = self._change = None  # by how much they lay elsewhere, and the last change of the control
         self._past = []
@@ -46,7 +47,7 @@ class Frames:
         """The `State` at rest under ``control``, as near as so many ``steps`` of the solver come, or as a step of no more
         than ``tolerance`` mm leaves it."""
         model = self.model
-        pose = pose_of(model, control)
+        pose = self._posed(control)
         positions, _, self.residual, self.iterations, planes = minimise(
             lambda x, planes: energy_gradient(model, pose, planes, x),
             lambda x: find_contacts(model, pose, x),
@@ -67,6 +68,15 @@ class Frames:
             positions[: model.count] += out
         self.state = State(positions, np.zeros_like(positions))
         return self.state
+
+    def _posed(self, control: Control) -> Pose:
+        """`pose_of` the control; where the lids go is kept while neither they nor the eyes move."""
+        looks = np.concatenate([np.ravel(x) for x in (control.lids, control.gaze, control.eyes)]).tobytes()
+        if looks != self._looks:
+            self._looks, self._lid_goal = looks, None
+        pose = pose_of(self.model, control, self._lid_goal)
+        self._lid_goal = pose.lid_goal
+        return pose
 
     def _start(self, pose: Pose, asked: np.ndarray) -> np.ndarray:
         """(3 n, 3) mm: where the nodes are likely to come to rest, bone and what is not free in its place."""

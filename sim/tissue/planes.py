@@ -36,7 +36,7 @@ def joined(*planes: Planes) -> Planes:
     between = [p for p in planes if p.rows is not None]
     if not between:
         return Planes(*tables)
-    rows = sparse.vstack([p.rows for p in between], format="csr")
+    rows = between[0].rows if len(between) == 1 else sparse.vstack([p.rows for p in between], format="csr")
     return Planes(*tables, rows, np.concatenate([p.row_level for p in between]))
 
 
