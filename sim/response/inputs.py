@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What the skin answers to, as plain numbers: a `Control` with all that moves no skin by itself left out."""
 
+from functools import cache
+
 import numpy as np
 
 from ..acting.pose import GAZE_REACH
@@ -19,7 +21,8 @@ OTHERS = (
 CENTRES = (OTHERS.index("lip_upper_forward"), OTHERS.index("lip_lower_forward"))
 
 
-def pulling(muscle_names) -> tuple[str, ...]:
+@cache
+def pulling(muscle_names: tuple[str, ...]) -> tuple[str, ...]:
     """The muscles that act on skin."""
     return tuple(name for name in muscle_names if base_name(name) not in JAW_MUSCLES)
 

@@ -8,9 +8,9 @@ what the others have done is taken from the force that each would have left alon
 import numpy as np
 
 from ..acting.pose import CONTROLS, JAW_WORK, LID_WORK, SIDE_WORK
-from ..tissue.muscle_field import LIPS, base_name
+from ..tissue.muscle_field import LIPS
 from .formula import LONGEST, Formula, clipped, most, of, weighted
-from .inputs import OTHERS
+from .inputs import OTHERS, pulling
 from .rig import Rig
 
 #: What counts in a muscle's force: progress by another muscle or input at its most, shares of the reach.
@@ -57,7 +57,7 @@ def quantities(rig: Rig) -> dict[str, Formula]:
 
 def _forces(rig: Rig) -> dict[str, Formula]:
     """``alone`` and ``force`` of every muscle whose force is spent by its own work or that of others."""
-    spending, names = rig.spending, _pulling(rig)
+    spending, names = rig.spending, pulling(rig.muscle_names)
     mutual, own = spending.mutual, np.diag(spending.mutual)
     full = 1 / (1 + own)  # of each muscle alone, fully contracted
     inputs = dict(
@@ -77,11 +77,6 @@ def _forces(rig: Rig) -> dict[str, Formula]:
         force = of(f"{name} alone") * (1 + own[k])
         out[f"{name} force"] = force if left is None else force * most(left, 0.0)
     return alone | out
-
-
-def _pulling(rig: Rig) -> tuple[str, ...]:
-    jaw = set(JAW_WORK)
-    return tuple(name for name in rig.muscle_names if base_name(name) not in jaw)
 
 
 def sliders(rig: Rig) -> tuple[str, ...]:

@@ -19,9 +19,11 @@ from .spending import progress_of
 #: Channels that go below 0.
 SIGNED = ("jaw_forward", "jaw_side", "gaze_x", "gaze_z", "gaze_l_x", "gaze_l_z", "gaze_r_x", "gaze_r_z")
 SIGNED += ("lip_upper_forward", "lip_lower_forward", "cheek_puff")
-#: Mixtures by how carefully a head is sampled; and solver iterations each is given (at 40 it rests within 0.02 mm rms).
-COUNTS = {"quick": 300, "normal": 800, "fine": 2000}
-ITERATIONS = 40
+#: Mixtures by how carefully a head is sampled.
+COUNTS = {"quick": 250, "normal": 800, "fine": 2000}
+#: Solver iterations at most, and the step (mm) at which a sample counts as at rest: 0.02 mm rms from it on average. A few
+#: poses need many; given up early they would lie whole millimetres off.
+ITERATIONS, TOLERANCE = 150, 0.05
 
 _EYES = ("frontalis", "corrugator", "lateral_corrugator", "depressor_supercilii", "procerus", "orbicularis_oculi")
 _EYES += ("levator_palpebrae", "auricularis", "occipitalis")
@@ -106,7 +108,7 @@ def drawn_poses(muscle_names, count: int, rng: np.random.Generator) -> list[Pose
     return single_poses(muscle_names) + [mixed_pose(muscle_names, rng) for _ in range(count)]
 
 
-def sampled(model: Model, poses, *, max_iterations: int = ITERATIONS, tolerance: float = 0.01) -> Work:
+def sampled(model: Model, poses, *, max_iterations: int = ITERATIONS, tolerance: float = TOLERANCE) -> Work:
     """Simulate ``poses``, each from rest; returns `Samples`."""
     names = model.muscle_names
     pulling = input_names(names)
