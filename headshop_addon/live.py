@@ -20,7 +20,7 @@ from . import bridge, dependencies, heads, jobs, muscle_names, response
 KEY = "Live"
 #: Solver iterations for one look while a slider is dragged or the time line plays, and for each round of the timer that
 #: brings the face to rest afterwards. Without a window the face is brought to rest at once.
-LOOK, ROUND, REST = 10, 25, 60
+LOOK, ROUND, REST = 8, 25, 60
 #: The timer stops when a round moves no vertex by more than this (mm), or after so many rounds.
 VISIBLE, ROUNDS = 0.05, 12
 #: `HEADSHOP_PG_object.model` -> the name of a model that keeps up with a slider; instant, where it was not
@@ -42,19 +42,25 @@ class _Instant:
         """The pose, at rest at once."""
         return model.state(control), True
 
+    def follower(self, model):
+        """Nothing has to be kept."""
+        return None
+
 
 INSTANT = _Instant()
 
 
 @dataclass
 class _Following:
-    """What acts for one skin: its model, where it rests, the last state and the sliders it belongs to."""
+    """What acts for one skin: its model, where it rests, the last state, what goes on from frame to frame (or None), and the
+    sliders it belongs to."""
 
     acting: Any
     fingerprint: int
     model: Any
     neutral: dict[str, np.ndarray]
     state: Any
+    frames: Any
     pose: tuple | None = None
     settled: bool = True
     rounds: int = 0
@@ -192,7 +198,10 @@ def _solve(skin, values, iterations) -> _Following | None:
     if moving:
         known = {*following.model.muscle_names, *muscle_names.CONTROLS}
         wanted = control(following.model, pose_from({name: v for name, v in values.items() if name in known}))
-        following.state, settled = following.acting.look(following.model, wanted, following.state, iterations)
+        if following.frames is None:
+            following.state, settled = following.acting.look(following.model, wanted, following.state, iterations)
+        else:
+            following.state, settled = following.frames.look(wanted, iterations)
         following.settled = settled or iterations == REST
         posed = posed_parts(following.model, following.state, wanted)
     else:  # rest is the scan itself, exactly
@@ -219,7 +228,9 @@ def _current(skin, moving: bool) -> _Following | None:
 
     model = response.acted(skin, mark) if instant else acting.build(heads.read_head(skin))
     state = acting.rest_state(model)
-    following = _Following(acting, mark, model, posed_parts(model, state, control(model, Pose())), state)
+    following = _Following(
+        acting, mark, model, posed_parts(model, state, control(model, Pose())), state, acting.follower(model)
+    )
     _following[skin.session_uid] = following
     return following
 

@@ -90,7 +90,10 @@ def bake_performance(
         outer = around(neutral["skin"])
         controls = [replace(asked, around=felt) for asked, felt in zip(controls, outer, strict=True)]
     converged = 0
-    states = _at_rest(acting, built, controls) if fps is None else _in_time(acting, built, controls, fps)
+    if fps is None:
+        states = acting.resting(built, controls, ITERATIONS)
+    else:
+        states = _in_time(acting, built, controls, fps)
     for number, asked in enumerate(controls):
         yield Progress(0.05 + 0.9 * number / len(poses), f"Simulating frame {number + 1} of {len(poses)}")
         state, settled = next(states)
@@ -110,15 +113,6 @@ def bake_performance(
         "error_mm": max((each.error for each in found.values()), default=0.0),
         "peak_mm": float(np.linalg.norm(motion["skin"], axis=2).max(initial=0.0)),
     }
-
-
-def _at_rest(acting, built, controls):
-    """Yields the state at rest at each of ``controls``, begun where the one before ended, and whether it is one."""
-    state = acting.rest_state(built)
-    for asked in controls:
-        solution = acting.solve(built, asked, state, max_iterations=ITERATIONS)
-        state = solution.state
-        yield state, solution.converged
 
 
 def _in_time(acting, built, controls, fps):

@@ -45,6 +45,22 @@ class ActingModel:
         solution = solver.solve(model, control, state, max_iterations=rounds)
         return solution.state, solution.converged
 
+    def follower(self, model):
+        """What acts under a slider instead of `look`, for a model that learns from frame to frame: has look(control, rounds);
+        None for others."""
+        return self._module("frames").Frames(model) if self.moves else None
+
+    def resting(self, model, controls, rounds: int):
+        """Yields the state at rest at each of ``controls``, begun where the one before ended, and whether it is one."""
+        if self.moves:
+            yield from self._module("frames").resting(model, controls, rounds)
+            return
+        state = self.rest_state(model)
+        for control in controls:
+            solution = self.solve(model, control, state, max_iterations=rounds)
+            state = solution.state
+            yield state, solution.converged
+
     @property
     def moves(self) -> bool:
         """Whether it can act in time, with masses that swing, and feels gravity, wind and the motion of the head."""

@@ -8,7 +8,7 @@ change of the control.
 
 import numpy as np
 
-from .clearing import way_out
+from .clearing import cleared, way_out
 from .drawn_contact import CLEAR
 from .energy import Pose, energy_gradient, find_contacts, pose_of
 from .solver import factorised, minimise, rest_state
@@ -16,6 +16,8 @@ from .structures import Control, Model, State
 
 #: Steps that a frame is given, and the mm of a step at which fewer do.
 STEPS, TOLERANCE = 8, 0.1
+#: The mm of a step at which a pose counts as settled.
+SETTLED = 0.01
 #: The last step is taken without a look at the energy behind it if no node moves farther, mm.
 _TRUST = 0.3
 #: Frames before that foretell the next, how far they may not be trusted (ridge, a share of their changes), and how much
@@ -47,7 +49,7 @@ class Frames:
         """The `State` at rest under ``control``, as near as so many ``steps`` of the solver come, or as a step of no more
         than ``tolerance`` mm leaves it."""
         model = self.model
-        pose = self._posed(control)
+        pose = self._pose = self._posed(control)
         positions, _, self.residual, self.iterations, planes = minimise(
             lambda x, planes: energy_gradient(model, pose, planes, x),
             lambda x: find_contacts(model, pose, x),
@@ -68,6 +70,19 @@ class Frames:
             positions[: model.count] += out
         self.state = State(positions, np.zeros_like(positions))
         return self.state
+
+    def cleared(self) -> State:
+        """The last frame with the drawn skin clear of eyeballs, teeth and the other lip whatever contact left, as `solve`
+        does it: it takes longer than a frame."""
+        positions = cleared(self.model, self._pose, self._at)
+        return State(positions, np.zeros_like(positions))
+
+    def look(self, control: Control, steps: int) -> tuple[State, bool]:
+        """For a slider: the state after at most so many ``steps``, and whether it is at rest. Few are a look in passing, more
+        bring it to rest."""
+        state = self.follow(control, steps, TOLERANCE if steps <= STEPS else SETTLED)
+        settled = steps > STEPS and self.converged
+        return (self.cleared() if settled else state), settled
 
     def _posed(self, control: Control) -> Pose:
         """`pose_of` the control; where the lids go is kept while neither they nor the eyes move."""
@@ -109,6 +124,14 @@ class Frames:
         moved = np.tensordot(share, [motion for _, motion in self._past], 1)
         farthest = np.sqrt(np.einsum("ij,ij->i", moved, moved).max(initial=0.0))
         return moved * min(1.0, _FAR / max(farthest, _FAR))
+
+
+def resting(model: Model, controls, steps: int):
+    """Yields the `State` at rest at each of ``controls``, within at most so many ``steps``, and whether it is at rest."""
+    frames = Frames(model)
+    for control in controls:
+        frames.follow(control, steps, SETTLED)
+        yield frames.cleared(), frames.converged
 
 
 def _millimetres(model: Model, control: Control) -> np.ndarray:
