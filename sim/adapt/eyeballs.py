@@ -27,25 +27,40 @@ BESIDE = (0.7, 0.35)  # how much of that holds for the seen lid one and two edge
 CLOSE = 0.5  # share of the reference's room around the caruncle that is enough
 ORBIT = (1.5, 2.8)  # radii of an eye from its centre: bone that goes with it, and bone that stays
 AROUND_CARUNCLE = 4.0  # mm: lids and eyeball this near carry it
+#: Weight of the lower lid's margin against all of the shut lids: it touches the iris or covers a little of it, but does not
+#: hang below, and where it lies is sure to half a millimetre; how thick lids are, to one.
+HANGING = 0.3
 OUTSIDE = 0.8  # mm of lid between eyeball and seen skin, at least, where the reference has as much
 
 
-def place_eye(eye: Eye, warped, reference_skin, fitted_skin, lid, inner, scale: float):
-    """The eye (an `Eye`) for a fitted skin, and the rotation (3, 3) that takes the reference's eye to it.
+def gaze_turn(eyes, warped) -> np.ndarray:
+    """The rotation (3, 3) that takes the reference's ``eyes`` to the fitted head's; of both, if both look the same way.
+
+    warped : per eye, callable that carries points (k, 3) of the reference into the fitted head
+    """
+    total = np.zeros((3, 3))
+    for eye, carry in zip(eyes, warped, strict=True):
+        axes = np.concatenate([np.eye(3), -np.eye(3)]) * eye.radius + eye.centre
+        turn, _ = similarity(axes, carry(axes))
+        total += turn / np.cbrt(np.linalg.det(turn))
+    left, _, right = np.linalg.svd(total)
+    return left @ right
+
+
+def place_eye(eye: Eye, warped, turn, reference_skin, fitted_skin, lid, inner, margin, scale: float) -> Eye:
+    """The eye for a fitted skin.
 
     Parameters
     ----------
     eye : of the reference, mm
     warped : callable that carries points (k, 3) of the reference into the fitted head
+    turn : (3, 3), see `gaze_turn`
     reference_skin, fitted_skin (n, 3) mm
     lid (n,) weights of both lids of this eye; inner (n,) bool: behind the lids
+    margin (m,) vertices of a shut lower lid's margin below the iris
     scale : size of the fitted head relative to the reference
     """
     radius = float(np.clip(eye.radius * scale ** (0.6 if scale < 1 else 0.4), SMALLEST, LARGEST))
-    # Points of the reference's sphere, carried along, tell place and direction.
-    axes = np.concatenate([np.eye(3), -np.eye(3)]) * eye.radius + eye.centre
-    turn, _ = similarity(axes, warped(axes))
-    turn = turn / np.cbrt(np.linalg.det(turn))
     gaze = turn @ eye.gaze
     gaze = gaze / np.linalg.norm(gaze)
     centre = warped(eye.centre[None])[0]
@@ -53,8 +68,12 @@ def place_eye(eye: Eye, warped, reference_skin, fitted_skin, lid, inner, scale: 
     front = (reference_skin - eye.centre) @ eye.gaze > 0
     near = np.flatnonzero((lid > 0.3) & ~inner & (gap < 0.35 * eye.radius) & front)
     if len(near) < 6:
-        return _moved(eye, centre, radius, gaze), turn
+        return _moved(eye, centre, radius, gaze)
     want = gap[near] * radius / eye.radius
+    up = np.array([0, 0, 1.0]) - eye.gaze[2] * eye.gaze
+    up /= np.linalg.norm(up)
+    low = (reference_skin[margin] - eye.centre).mean(axis=0) @ up * radius / eye.radius if len(margin) else 0.0
+    rim, up = fitted_skin[margin].mean(axis=0) if len(margin) else centre, turn @ up
     points, prior = fitted_skin[near], centre.copy()
     for _ in range(30):
         away = points - centre
@@ -63,12 +82,15 @@ def place_eye(eye: Eye, warped, reference_skin, fitted_skin, lid, inner, scale: 
         # An eyeball through a lid is seen at once, a gap behind it is not.
         weight = np.where(miss < 0, 4.0, 1.0) / (1 + (miss / 1.5) ** 2)
         unit = away / length[:, None]
-        system = (weight[:, None] * unit).T @ unit + 0.05 * len(near) * np.eye(3)
-        step = np.linalg.solve(system, (weight * miss) @ unit + 0.05 * len(near) * (prior - centre))
+        hangs = (rim - centre) @ up - low
+        hold = HANGING * len(near) * (hangs < 0) * (len(margin) > 0)
+        system = (weight[:, None] * unit).T @ unit + 0.05 * len(near) * np.eye(3) + hold * np.outer(up, up)
+        right = (weight * miss) @ unit + 0.05 * len(near) * (prior - centre) + hold * hangs * up
+        step = np.linalg.solve(system, right)
         centre = centre + step
         if np.linalg.norm(step) < 1e-4:
             break
-    return _moved(eye, centre, radius, gaze), turn
+    return _moved(eye, centre, radius, gaze)
 
 
 def _moved(eye, centre, radius, gaze):

@@ -64,10 +64,12 @@ def follow(
 
     yield Progress(0.25, "Eyes and teeth")
     eyes, carried, skull = [], {"mouth": mouth}, parts["skull"]
-    for k, side in enumerate("lr"):
-        old = reference.eyes[k]
-        around = near_bone(rest, parts, old.centre[None], AROUND_EYE)
-        new, turn = eyeballs.place_eye(old, around, start, skin, rest.lids(side), rest.inner, scale)
+    both = [near_bone(rest, parts, eye.centre[None], AROUND_EYE) for eye in reference.eyes]
+    for old, around, side in zip(reference.eyes, both, "lr", strict=True):
+        # lids that are shut tell nothing of where an eye looks
+        turn = eyeballs.gaze_turn(reference.eyes, both) if side in rest.slits else eyeballs.gaze_turn((old,), (around,))
+        lids = rest.lids(side), rest.inner, rest.under_iris[side]
+        new = eyeballs.place_eye(old, around, turn, start, skin, *lids, scale)
         eyes.append(new)
         skull = eyeballs.with_orbit(skull, new, new.centre - around(old.centre[None])[0])
         carried[f"eye_{side}"] = eyeballs.eye_similarity(old, new, turn)
@@ -77,6 +79,8 @@ def follow(
 
     yield Progress(0.35, "Inner skin")
     final = np.array(skin, dtype=float)
+    for slit in rest.slits.values():
+        final = restored(rest, final, slit.hidden)
     final = lips_met(rest, final, size)
     for organ in rest.organs:
         final = lined(rest, final, organ, carried.get(organ))
@@ -93,6 +97,8 @@ def follow(
     final = lips_parted(rest, final, size)
     for eye, side in zip(eyes, "lr", strict=True):
         final = eyeballs.settled_lids(rest, final, eye, side)
+        if side in rest.slits:
+            final = rest.slits[side].met(final, eye, reference.landmarks.on({"skin": final}))
     parts["skin"] = final
     for k, (eye, side) in enumerate(zip(eyes, "lr", strict=True)):
         part = f"eye_{side}"

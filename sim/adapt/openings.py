@@ -114,15 +114,17 @@ def lid_margins(reference: Head, rim, given, matrix, closed=()):
 
 
 def closed_eyes(reference: Head, landmarks, given) -> list[str]:
-    """Sides whose lids the landmarks put together: ``ps`` and ``pi`` were both given and nearly meet."""
+    """Sides whose lids the landmarks put together: ``ps`` and ``pi`` were both given and nearly meet, if only side by side."""
     rest = reference.landmark_positions()
     out = []
     for side in ("l", "r"):
         names = [f"{x}_{side}" for x in ("ps", "pi", "en", "ex")]
-        if all(n in given for n in names[:2]) and all(n in rest for n in names):
+        if all(n in given for n in names[:2]) and all(n in rest for n in (*names, "n", "gn")):
 
             def opening(p, names=names):
-                return np.linalg.norm(p[names[0]] - p[names[1]]) / np.linalg.norm(p[names[2]] - p[names[3]])
+                along, up = p[names[3]] - p[names[2]], p["n"] - p["gn"]
+                up = up - (up @ along) / (along @ along) * along
+                return (p[names[0]] - p[names[1]]) @ up / (np.linalg.norm(up) * np.linalg.norm(along))
 
             if opening(landmarks) < CLOSED * opening(rest):
                 out.append(side)

@@ -14,7 +14,8 @@ from ..mesh_subdivision import drawn
 from . import bone
 from .eyeballs import lid_contact
 from .lid_contact import LidContact
-from .openings import rims
+from .met_lids import LidSlit
+from .openings import rims, touching_lids
 from .refine import scattered, thinned
 from .skin_cover import SkinCover
 from .skin_fit import group
@@ -24,6 +25,7 @@ from .untangle import sharp
 
 BONES = ("skull", "mandible")
 TEETH = ("teeth_upper", "teeth_lower")
+SHUT = 8  # pairs of vertices of lids that lie on each other, from which on an eye is shut
 MEET = 4.0  # mm: lips that close at rest lie on each other
 COARSE = 14.0  # mm between centres of the warps, away from lids and lips
 #: Parts that carry what lies between the surfaces, and mm between the points of each that do.
@@ -109,6 +111,23 @@ class Rest:
     def contacts(self) -> dict[str, LidContact]:
         """Side -> how the lids of that eye are brought to lie on an eyeball."""
         return {side: lid_contact(self, side) for side in "lr"}
+
+    @cached_property
+    def slits(self) -> dict[str, LidSlit]:
+        """Side -> the slit between its lids, of the eyes that are shut."""
+        return {side: LidSlit(self, side) for side in "lr" if len(touching_lids(self.head, self.rim, side)) >= SHUT}
+
+    @cached_property
+    def under_iris(self) -> dict[str, np.ndarray]:
+        """Side -> (k,) vertices of the lower lid's margin below the iris of that eye; none if it is open: then its lids'
+        own places tell enough."""
+        out = {}
+        for eye, side in zip(self.head.eyes, "lr", strict=True):
+            margin = np.flatnonzero(self.rim & (group(self.head, f"lid_lower_{side}") > 0.5))
+            across = np.cross(eye.gaze, [0, 0, 1.0])
+            off = np.abs((self.head.skin.vertices[margin] - eye.centre) @ across) / np.linalg.norm(across)
+            out[side] = margin[off < eye.iris_radius] if side in self.slits else margin[:0]
+        return out
 
     def _lip_pairs(self):
         skin = self.head.skin.vertices

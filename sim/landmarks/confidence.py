@@ -72,6 +72,13 @@ def judge_together(positions, confidence, mid_air, rest, shut) -> dict[str, floa
     return out
 
 
+def sure_as_corners(confidence, name: str) -> float:
+    """Confidence in ``name`` (``ps`` or ``pi`` with a side) of a shut eye: the line on which lids meet is as sure as the less
+    sure of the eye's corners, between which it runs."""
+    side = name[-1]
+    return min(confidence.get(f"en_{side}", 0.0), confidence.get(f"ex_{side}", 0.0))
+
+
 def _opening(places, lids):
     ps, pi, en, ex = (places[n] for n in lids)
     return np.linalg.norm(ps - pi) / max(np.linalg.norm(en - ex), 1e-9)

@@ -13,6 +13,7 @@ from .shape_space import ShapeSpace
 AROUND_EYE = 22.0  # mm
 FAR = 3.0  # mm that a point of the skin without data counts as
 AROUND_MOUTH = 35.0  # mm
+SHUT = 0.6  # eyes shut this far though they were taken for open are shut: a broad smile shuts them by 0.4
 REASON = 0.95  # shut eyes must fit that much better
 PARTED = 0.97  # and so must parted lips
 LOOKED = np.linspace(-0.28, 0.28, 9)  # shares of the way from the middle of the mouth to its corners
@@ -20,6 +21,7 @@ LOOKED = np.linspace(-0.28, 0.28, 9)  # shares of the way from the middle of the
 #: share of lines with one from which on the eyes are open.
 EYE_LINES, ACROSS, LINE = np.linspace(0.25, 0.75, 11), 9.0, 60
 HOLE, HOLED = 1.2, 0.3
+HOLED_SHUT = 0.45  # the same of eyes that the skin says are shut: lashes have holes as well
 FEW = 25  # percent of them at which lips that are parted may seem closed: noise looks like edges in places only
 
 
@@ -30,14 +32,21 @@ def fit_expression(space: ShapeSpace, target: Surface, fit: ShapeFit):
     mouth = about_mouth(space)
     parted = lips_parted(space, free, target) and cost(space, free, mouth) < PARTED * cost(space, fit, mouth)
     fit = free if parted else fit
+    holes = holes_in_eyes(space.landmarks(fit.points), fit.matrix, target)
+    if holes < HOLED_SHUT and min(shut_share(space, fit).values()) > SHUT:
+        return fit, Expression(parted, ("l", "r"))
     shut = Expression(parted, ("l", "r"))
     moved = fit.coefficients + space.shut["l"] + space.shut["r"]
     rival = yield from _half(fit_shape(space, target, fit.pose, CHANGE, moved, 1, shut), 0.5)
     about = eyes(space)
-    holed = holes_in_eyes(space.landmarks(fit.points), fit.matrix, target)
-    if holed < HOLED and cost(space, rival, about) < REASON * cost(space, fit, about):
+    if holes < HOLED and cost(space, rival, about) < REASON * cost(space, fit, about):
         return rival, shut
     return fit, Expression(parted)
+
+
+def shut_share(space: ShapeSpace, fit: ShapeFit) -> dict[str, float]:
+    """Side -> how far that eye is shut in a fit that took it for open: 0 as the reference's, 1 shut."""
+    return {side: float(fit.coefficients @ shut / (shut @ shut)) for side, shut in space.shut.items()}
 
 
 def _half(work, start):

@@ -15,7 +15,7 @@ from ..errors import InputError
 from ..mesh import Mesh, vertex_normals
 from ..progress import Progress, Work, portion
 from ..scan.face_match import face_template, surface_samples
-from .confidence import judge, judge_together
+from .confidence import judge, judge_together, sure_as_corners
 from .expression import fit_expression, meeting_lids
 from .picked import picked
 from .pose_search import LOOKING, search_poses
@@ -122,7 +122,10 @@ def find_landmarks(mesh: Mesh, reference: Head | None = None, unit_scales=(1.0,)
     seen = Mesh.from_triangles(target.vertices, target.triangles)
     other = yield from portion(weighed(seen, positions, confidence, reference, target), 0.9, 1.0)
     positions = {n: p if n.partition("_")[0] in OWN else other[n] for n, p in positions.items()}
-    positions |= {n: p for n, p in meeting_lids(space, fit, target, shown.shut).items() if n in positions}
+    met = {n: p for n, p in meeting_lids(space, fit, target, shown.shut).items() if n in positions}
+    positions |= met
+    mid_air = tuple(n for n in mid_air if n not in met)
+    confidence |= {n: max(confidence[n], sure_as_corners(confidence, n)) for n in met}
     confidence = judge_together(positions, confidence, mid_air, reference.landmark_positions(), shown.shut)
     return FoundLandmarks(positions, confidence, mid_air, missing, scale, misfit)
 

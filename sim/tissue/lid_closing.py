@@ -17,6 +17,11 @@ PLATE = 2.3
 EVEN = 2
 
 
+def rise(along, elevation, radius: float) -> np.ndarray:
+    """(k,) mm up, over the plane of both corners of the eye and the centre, of points of a ball (mm along the lid, rad)."""
+    return np.sqrt(np.maximum(radius**2 - along**2, (0.3 * radius) ** 2)) * np.sin(elevation)
+
+
 def lower_share(along, corners, upper, lower, radius: float) -> np.ndarray:
     """(v,) share of the opening that the lower lid covers, so that the lids meet on an arc through both corners.
 
@@ -26,17 +31,14 @@ def lower_share(along, corners, upper, lower, radius: float) -> np.ndarray:
     (a0, e0), (a1, e1) = corners
     middle = np.array([(a0 + a1) / 2])
 
-    def rise(at, elevation):
-        return np.sqrt(np.maximum(radius**2 - at**2, (0.3 * radius) ** 2)) * np.sin(elevation)
-
     def meet(at):
-        low = rise(at, lower(at))
-        return low + LOWER_SHARE * (rise(at, upper(at)) - low)
+        low = rise(at, lower(at), radius)
+        return low + LOWER_SHARE * (rise(at, upper(at), radius) - low)
 
-    ends = rise(np.array([a0, a1]), np.array([e0, e1]))
+    ends = rise(np.array([a0, a1]), np.array([e0, e1]), radius)
     t = (along - a0) / (a1 - a0)
     arc = ends[0] + t * (ends[1] - ends[0]) + 4 * t * (1 - t) * (meet(middle) - ends.mean())
-    low, high = rise(along, lower(along)), rise(along, upper(along))
+    low, high = rise(along, lower(along), radius), rise(along, upper(along), radius)
     return np.clip((arc - low) / np.maximum(high - low, 0.5), *SHARES)
 
 

@@ -14,6 +14,7 @@ from ..mesh import edges
 from .layers import Layers
 from .lid_closing import lower_share, relief
 from .lid_edges import LidEdge, strips
+from .lid_opening import missing_opening
 from .structures import Lids
 
 #: The middle of a lid lags behind its ends as it closes, so that its edge stays an arc: exponents over the share at the
@@ -26,9 +27,9 @@ _SEAL = -0.08
 _FOLLOW = (0.75, 0.6, 0.3, 0.12)
 #: mm between skin and eyeball where the lid is taut.
 _TAUT = 2.6
-#: rad between the margins of an open eye (11 mm on a ball of 12 mm), and how much of it a full levator restores to an
-#: eye that was scanned closed, per share by which it widens an open one.
-_OPEN, _WAKE = 0.9, 3.2
+#: Share of an open eye's slit that a levator gives back to an eye that was scanned shut, per share by which it widens an
+#: open one.
+_WAKE = 3.125
 
 
 def eye_profile(eye: Eye) -> tuple[np.ndarray, np.ndarray]:
@@ -104,7 +105,7 @@ def build_lids(head: Head, layers: Layers, side: str) -> Lids | None:
     within = np.clip(along_margin, a0, a1)
     opening = np.clip(curves[0](within) - curves[1](within), 0, 1.4)
     across = np.clip((2 * within - a0 - a1) / (a1 - a0), -1, 1)
-    missing = np.clip(_OPEN * (1 - across**2) - opening, 0, None) * float(opening.max() < 0.5 * _OPEN)
+    missing = missing_opening(within, corners, *curves, upper, eye, float(eye.radius * eye.gaze @ axis))
     # weight: 1 at the margin, 0 where the lid's own group ends; the groups are taken as drawn, scaled to reach 1
     weight = np.clip(share[column] / max(np.percentile(share[column], 90), 1e-3), 0, 1)
     off = np.abs(elevation - np.where(upper, curves[0](within), curves[1](within)))
@@ -132,7 +133,8 @@ def build_lids(head: Head, layers: Layers, side: str) -> Lids | None:
         inner=inner,
         hold=weight**2 * np.where(inner, 0.5, 1.0),
         opening=opening,
-        missing=missing,
+        missing=np.zeros(len(column)) if missing is None else missing,
+        awake=float(missing is None),
         middle=1 - across**4,
         lower_share=lower_share(within, corners, *curves, eye.radius),
         relief=np.zeros((len(column), 3)),
@@ -148,8 +150,9 @@ def build_lids(head: Head, layers: Layers, side: str) -> Lids | None:
     row = np.full(len(v), -1)
     row[column] = np.arange(len(column))
     near = row[pair][(row[pair] >= 0).all(axis=1)]
-    spread = relief(lids, flat, root, length, near, lambda points: eyeball_radius(lids, points, np.zeros(2)))
-    lids = replace(lids, relief=spread)
+    if lids.awake:  # the skin of lids scanned shut lies spread already
+        spread = relief(lids, flat, root, length, near, lambda points: eyeball_radius(lids, points, np.zeros(2)))
+        lids = replace(lids, relief=spread)
     return replace(lids, seal=_seal(lids, head, surface, within))
 
 
@@ -215,15 +218,17 @@ def lid_targets(lids: Lids, upper: float, lower: float, gaze: np.ndarray) -> np.
     lid that it slides under, and the fold over the crease is drawn flat as the lid goes down.
     """
     down, rise = max(-float(gaze[1]), 0.0), max(float(gaze[1]), 0.0)
-    travel = lids.opening + (_WAKE * lids.missing if upper < 0 else 0.0)
+    woken = np.clip(-_WAKE * upper, 0, None) * (1 - lids.awake)
+    awake = np.clip(lids.awake + woken, 0, 1)
     shut = np.clip(upper, 0, 1)
-    along = (1 - 0.6 * shut) * (_FOLLOW[3] * rise - _FOLLOW[2] * down)
-    follow = (1 - shut) * (_FOLLOW[1] * rise - _FOLLOW[0] * down) + shut * along
-    turn_upper = -_lagging(lids, upper) * (1 - lids.lower_share) * travel + lids.middle * follow
+    along = awake * (1 - 0.6 * shut) * (_FOLLOW[3] * rise - _FOLLOW[2] * down)
+    follow = awake * (1 - shut) * (_FOLLOW[1] * rise - _FOLLOW[0] * down) + shut * along
+    turn_upper = -_lagging(lids, upper) * (1 - lids.lower_share) * lids.opening + lids.middle * follow
     turn_lower = _lagging(lids, lower) * lids.lower_share * lids.opening + lids.middle * along
+    turn_upper, turn_lower = turn_upper + woken * lids.missing, turn_lower - woken * lids.missing
     # never past each other: the meeting line limits both, whichever way the eye looks
-    closed = np.maximum(turn_lower - turn_upper, 1e-9)
-    over = np.minimum(lids.opening / closed, 1.0)
+    closed = turn_lower - turn_upper
+    over = np.where(closed > lids.opening, lids.opening / np.maximum(closed, 1e-9), 1.0)
     share = np.clip(closed * over / np.maximum(lids.opening, 1e-9), 0, 1)
     press = lids.seal * share**4 * (lids.opening > 0)
     turn = np.where(lids.upper, turn_upper * over - press, turn_lower * over + press)
@@ -243,7 +248,9 @@ def lid_targets(lids: Lids, upper: float, lower: float, gaze: np.ndarray) -> np.
     under = eyeball_radius(lids, lids.eye.centre + target, gaze)
     close = np.where(lids.inner, 1.0, lids.weight) * np.clip((5.0 - gap) / 2.5, 0, 1)
     # a lining that is drawn out between margin and fornix stands off, or it would cut the corner
-    height = height + lids.inner * np.abs(turn) * (0.4 + 2.5 * (1 - lids.weight)) * (lids.weight < 0.99)
+    out = np.where(lids.upper, -turn, turn)
+    out = np.clip(out, 0, None) if not lids.awake else np.abs(turn)
+    height = height + lids.inner * out * (0.4 + 2.5 * (1 - lids.weight)) * (lids.weight < 0.99)
     want = size + close * (under + height - size) + (1 - close) * (height - gap)
     want = np.maximum(want, under + np.minimum(gap, 0.15))
     return lids.eye.centre + target * (want / np.maximum(size, 1e-9))[:, None] + (share**2)[:, None] * lids.relief

@@ -105,7 +105,8 @@ class Lids:
     axis, forward, up : the eye's frame; along, elevation, radius (v,) the cylindrical coordinates of each vertex
     hold (v,) share of the lid stiffness with which it is held to its place
     upper : (v,) bool; opening (v,) rad between the margins at the vertex's place;
-    missing (v,) rad that a scan with closed eyes lacks to an open eye; inner (v,) bool: behind the margin
+    missing (v,) rad that each lid of a scan with closed eyes lacks to an open eye; awake: 0 for such an eye, 1 for open ones
+    inner (v,) bool: behind the margin
     middle : (v,) 0 at the corners of the eye, 1 between them
     lower_share (v,) share of the opening that the lower lid covers in a blink
     relief (v, 3) mm by which shut lids lie otherwise than plain turning would have it
@@ -127,6 +128,7 @@ class Lids:
     hold: np.ndarray
     opening: np.ndarray
     missing: np.ndarray
+    awake: float
     middle: np.ndarray
     inner: np.ndarray
     lower_share: np.ndarray
