@@ -14,7 +14,7 @@ from .spending import fit_spending
 
 REGIONS = 12
 #: mm that a vertex must move in some sample to be in a region at all; mm rms that the modes may lose.
-_STILL, _LOST = 0.01, 0.012
+_STILL, _LOST = 0.01, 0.016
 #: A region feels an input that moves it by this share of what its strongest one does.
 _FELT = 0.002
 #: Of that share, for its weight: between ignoring the weak and taking all alike.

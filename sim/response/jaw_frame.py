@@ -6,6 +6,7 @@ Nodes are restored to the *posed rest*, where they would be if they only followe
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -25,8 +26,17 @@ class JawFrame:
         """(n, 3) mm where the skin is, from its ``own`` motion (n, 3) in the frame of ``jaw`` (open, forward, side)."""
         rotation, translation = jaw_transform(self.jaw, *jaw)
         turn = (rotation - np.eye(3)).T
-        moved = self.rest + own
-        return moved + self.share[:, None] * (moved @ turn + translation)
+        out = self.rest + own
+        rows, share = self._carried
+        moved = out[rows]
+        out[rows] = moved + share * (moved @ turn + translation)
+        return out
+
+    @cached_property
+    def _carried(self) -> tuple[np.ndarray, np.ndarray]:
+        """The vertices that move with the mandible at all, and their shares (k, 1)."""
+        rows = np.flatnonzero(self.share)
+        return rows, self.share[rows, None]
 
     def own(self, skin: np.ndarray, jaw) -> np.ndarray:
         """(n, 3) mm: the skin's own motion, of which `placed` makes ``skin`` (n, 3) again."""
