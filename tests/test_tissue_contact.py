@@ -137,3 +137,15 @@ def test_gums_take_their_lining_along(model, reference):
     goal = np.where(below[:, None] > 0, rest @ pose.rotation.T + pose.translation, rest)
     away = np.linalg.norm(moved - goal, axis=1)[firm]
     assert away.max() < 1 and np.median(away) < 0.1
+
+
+def test_lids_go_a_little_with_a_sideways_gaze(model, reference):
+    """The cornea carries their middle along; the corners of the eye stay."""
+    moved = solve(model, control(model, Pose(gaze_x=1.0))).state.skin - reference.skin.vertices
+    at = {
+        name: moved[np.linalg.norm(reference.skin.vertices - p, axis=1).argmin()]
+        for name, p in reference.landmark_positions().items()
+    }
+    for side in "lr":
+        assert 0.4 < at[f"ps_{side}"][0] < 2.5 and 0.2 < at[f"pi_{side}"][0] < 2.5
+        assert abs(at[f"en_{side}"][0]) < 0.4 and abs(at[f"ex_{side}"][0]) < 0.4

@@ -25,6 +25,9 @@ _LAG = (0.75, 1.4)
 _SEAL = -0.08
 #: Share of a vertical gaze that the lids follow: (upper lid down, up; lower lid down, up).
 _FOLLOW = (0.75, 0.6, 0.3, 0.12)
+#: Share of a sideways gaze by which the middle of the lids is carried along: the cornea's bulge takes them with it, the
+#: corners of the eye stay.
+_ASIDE = 0.25
 #: mm between skin and eyeball where the lid is taut.
 _TAUT = 2.6
 #: Share of an open eye's slit that a levator gives back to an eye that was scanned shut, per share by which it widens an
@@ -242,7 +245,9 @@ def lid_targets(lids: Lids, upper: float, lower: float, gaze: np.ndarray) -> np.
     drawn = drawn * np.clip(4 * lids.weight * (1 - lids.weight), 0, 1)
     height = gap - drawn * np.maximum(gap - _TAUT - 6 * (1 - lids.weight) ** 3, 0)
     plane = np.cos(angle)[:, None] * lids.forward + np.sin(angle)[:, None] * lids.up
-    target = lids.along[:, None] * lids.axis + lids.radius[:, None] * plane
+    # to the subject's left is along the lid, out or in
+    aside = _ASIDE * lids.eye.radius * np.sin(float(gaze[0])) * np.sign(lids.axis[0]) * lids.middle * lids.weight
+    target = (lids.along + aside)[:, None] * lids.axis + lids.radius[:, None] * plane
     size = np.linalg.norm(target, axis=1)
     # near the ball, heights are over what lies below now
     under = eyeball_radius(lids, lids.eye.centre + target, gaze)

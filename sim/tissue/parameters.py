@@ -38,7 +38,7 @@ class Parameters:
     contact: float = 10.0
     lid: float = 1500.0
     #: lips held together, per mm² of lip.
-    seal: float = 90.0
+    seal: float = 125.0
     #: force of full pressure in the mouth, per mm² of cheek, and the mm of motion at which it is spent.
     puff: float = 6.0
     puff_reach: float = 18.0
