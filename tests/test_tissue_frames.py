@@ -45,7 +45,7 @@ def test_a_control_that_stays_is_brought_to_rest(model, laugh):
     frames = Frames(model)
     for _ in range(12):
         frames.follow(laugh[-1], 6, 0.005)
-    assert frames.converged and frames.iterations == 1
+    assert frames.converged and frames.iterations <= 2
     assert _apart(frames.state, solve(model, laugh[-1], max_iterations=200, tolerance=2e-3).state) < 0.05
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from .clearing import cleared, way_out
 from .drawn_contact import CLEAR
 from .energy import Pose, energy_gradient, find_contacts, pose_of
-from .solver import factorised, minimise, rest_state
+from .solver import descend, factorised, minimise, rest_state
 from .structures import Control, Model, State
 
 #: Steps that a frame is given, and the mm of a step at which fewer do.
@@ -50,17 +50,8 @@ class Frames:
         than ``tolerance`` mm leaves it."""
         model = self.model
         pose = self._pose = self._posed(control)
-        positions, _, self.residual, self.iterations, planes = minimise(
-            lambda x, planes: energy_gradient(model, pose, planes, x),
-            lambda x: find_contacts(model, pose, x),
-            factorised(model),
-            model.cache["matrix"]["free"],
-            self._start(pose, _millimetres(model, control)),
-            steps,
-            tolerance,
-            self._pairs,
-            _TRUST,
-        )
+        start = self._start(pose, _millimetres(model, control))
+        positions, self.residual, self.iterations, planes = self._descended(pose, start, steps, tolerance)
         self.converged = self.residual <= tolerance
         self._at = positions
         # contact keeps a little off: what is nearer has not gone through
@@ -70,6 +61,27 @@ class Frames:
             positions[: model.count] += out
         self.state = State(positions, np.zeros_like(positions))
         return self.state
+
+    def _descended(self, pose: Pose, start, steps, tolerance):
+        """Positions (3 n, 3) mm, the mm of the last step, the steps, and the contacts, found once for a few steps."""
+        model = self.model
+        at = factorised(model), model.cache["matrix"]["free"], start
+        if steps > STEPS:
+            positions, _, residual, done, planes = minimise(
+                lambda x, planes: energy_gradient(model, pose, planes, x),
+                lambda x: find_contacts(model, pose, x),
+                *at,
+                steps,
+                tolerance,
+                self._pairs,
+                _TRUST,
+            )
+            return positions, residual, done, planes
+        planes = find_contacts(model, pose, start)
+        positions, _, residual, done = descend(
+            lambda x: energy_gradient(model, pose, planes, x), *at, self._pairs, steps, tolerance, _TRUST
+        )
+        return positions, residual, done, planes
 
     def cleared(self) -> State:
         """The last frame with the drawn skin clear of eyeballs, teeth and the other lip whatever contact left, as `solve`
