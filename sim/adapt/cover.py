@@ -24,7 +24,7 @@ class Cover:
         usual = max(float(np.median(np.sqrt(2 * area))), 1e-6)
         samples, self.owner, self.radius = spread(corners, usual * (0.55 if len(corners) < FEW else 0.75))
         self.most, self.usual = float(self.radius.max()), float(np.percentile(self.radius, USUAL))
-        self._tree = cKDTree(samples)
+        self._tree = cKDTree(samples, balanced_tree=False)
 
     def nearest(self, points, count, reach):
         """Distance (k, c) mm and index (k, c) of the ``count`` samples nearest to points (k, 3).

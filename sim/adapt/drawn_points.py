@@ -8,7 +8,7 @@ fitted is the surface as it is drawn, and data between the vertices counts as mu
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_matrix, csr_matrix, diags
+from scipy.sparse import coo_matrix, csr_matrix, diags, identity
 
 from ..mesh import Mesh, edges
 from ..mesh_subdivision import smoother
@@ -26,7 +26,6 @@ class DrawnPoints:
     seen (s,) bool : points a scanner can see: all the cage's vertices around them are seen
     around (s, s) : mean of the points beside each
     look (s,) bool : points that look for data, likewise
-    coarse (s,) bool : those of them at vertices and in the middles of faces
     """
 
     rows: csr_matrix
@@ -34,7 +33,6 @@ class DrawnPoints:
     around: csr_matrix
     seen: np.ndarray
     look: np.ndarray
-    coarse: np.ndarray
 
     def between(self, points) -> np.ndarray:
         """``points`` (s, 3) moved to where the flat triangles around them lie in the mean: a curved surface bulges over
@@ -57,11 +55,15 @@ def drawn_points(faces, free, seen) -> DrawnPoints:
     def between(chosen):
         return np.concatenate([chosen, chosen[pair].all(axis=1), np.where(faces >= 0, chosen[faces], True).all(axis=1)])
 
-    look = between(free)
-    coarse = look.copy()
-    coarse[n : n + len(pair)] = False
     a, b = edges(quads).T
     link = coo_matrix((np.ones(2 * len(a)), (np.r_[a, b], np.r_[b, a])), shape=(rows.shape[0],) * 2).tocsr()
     around = (diags(1 / np.maximum(np.asarray(link.sum(axis=1)).ravel(), 1)) @ link).tocsr()
     triangles = Mesh(np.zeros((rows.shape[0], 3)), quads).triangles
-    return DrawnPoints(rows, triangles, around, between(seen), look, coarse)
+    return DrawnPoints(rows, triangles, around, between(seen), between(free))
+
+
+def own_points(faces, free, seen) -> DrawnPoints:
+    """`drawn_points` with the vertices alone, of a cage that is drawn as it is."""
+    n = len(free)
+    rows = identity(n, format="csr")
+    return DrawnPoints(rows, Mesh(np.zeros((n, 3)), faces).triangles, rows, seen, free)

@@ -13,26 +13,26 @@ import numpy as np
 from scipy.sparse import csr_matrix, vstack
 
 from ..mesh import cross_sides, vertex_normals
+from ..mesh_subdivision import drawn, undrawn
 from .closest import Surface
-from .drawn_points import DrawnPoints, drawn_points
+from .drawn_points import DrawnPoints, drawn_points, own_points
 from .smooth_system import Smoothness, solve_displacement
 from .tracked import Tracked
 
-#: One round each: stiffness of bending, reach in mm, width in mm of what counts as an outlier.
+#: One round each: stiffness of bending, reach in mm, width in mm of what counts as an outlier. The last may be repeated.
 SCHEDULE = (
-    (4.0, 12.0, 4.0),
-    (1.5, 10.0, 3.0),
-    (0.6, 8.0, 2.5),
+    (1.0, 9.0, 3.0),
     (0.25, 6.0, 2.0),
-    (0.1, 5.0, 1.5),
-    (0.04, 4.0, 1.2),
-    (0.015, 4.0, 1.0),
+    (0.06, 5.0, 1.5),
+    (0.015, 4.0, 1.2),
     (0.005, 4.0, 1.0),
 )
 ALONG = 0.02  # weight of a pull along the surface against one across it
 AGREE = 0.6  # cosine between the normals of skin and scan
 WHOLE = 150.0  # mm²: a piece of data smaller than this is trusted in proportion
-FINE = 0.2  # stiffness below which data in between the cage's vertices is looked for too
+FINE = 0.05  # stiffness below which data in between the cage's vertices is looked for too
+LEFT = 0.06  # mm by which the last round may find the skin off, in the mean
+AGAIN = 2  # times at most that it is repeated if it is farther off
 LAST = 0.02  # stiffness below which rims look for data
 CLOSE = 1.5  # mm: how far they look
 
@@ -85,16 +85,27 @@ def fine_fit(cage, faces, free, rim, target: Surface, anchors: Anchors, stiffnes
     rim (n,) bool : vertices that look for data in the last rounds only, and only close by (margins of lips and lids)
     stiffness (n,) : factor on the bending stiffness of each vertex (1 everywhere by default)
     """
-    base = np.array(cage, dtype=float)
-    n = len(base)
+    n, turns = len(cage), len(rounds) + AGAIN
+    base = drawn(faces, np.asarray(cage, dtype=float))
     smooth = Smoothness(base, faces, np.ones(n) if stiffness is None else stiffness)
     surface = drawn_points(faces, free, free | rim)
-    anchors = replace(anchors, sampling=(anchors.sampling @ surface.rows[:n]).tocsr())
     tracked = Tracked(target, surface.rows.shape[0])
+    # While the skin is stiff, the drawn surface's own vertices stand for all of it: a small system.
+    own = own_points(faces, free, free | rim)
+    stiff = [step for step in rounds if step[0] >= FINE]
     moved = np.zeros((n, 3))
-    for turn, step in enumerate(rounds):
-        moved = nearer(base, moved, surface, tracked, anchors, smooth, step)
-        yield (turn + 1) / len(rounds)
+    for turn, step in enumerate(stiff):
+        moved, _ = nearer(base, moved, own, tracked, anchors, smooth, step)
+        yield (turn + 1) / turns
+    base = undrawn(faces, base + moved, base + moved)
+    moved = np.zeros((n, 3))
+    anchors = replace(anchors, sampling=(anchors.sampling @ surface.rows[:n]).tocsr())
+    soft = list(rounds[len(stiff) :])
+    for turn, step in enumerate(soft + soft[-1:] * AGAIN):
+        moved, off = nearer(base, moved, surface, tracked, anchors, smooth, step)
+        yield (len(stiff) + turn + 1) / turns
+        if turn + 1 >= len(soft) and off <= LEFT:
+            break
     cage = base + moved
     now = surface.rows @ cage
     vertices = now[:n]
@@ -108,12 +119,13 @@ def fine_fit(cage, faces, free, rim, target: Surface, anchors: Anchors, stiffnes
 def nearer(base, moved, surface: DrawnPoints, tracked: Tracked, anchors: Anchors, smooth: Smoothness, step):
     """One round, from the displacement ``moved`` (n, 3) of ``base`` (n, 3), of which ``surface`` is made, to the next.
 
-    step : of the schedule. Surroundings of folds are made stiffer in ``smooth``.
+    step : of the schedule. Surroundings of folds are made stiffer in ``smooth``. Returns the displacement (n, 3) mm, and
+    how far off the data the skin was before, across it, in the mean, mm.
     """
     soft, reach, width = step
     now = surface.rows @ (base + moved)
     normal = vertex_normals(now, surface.outer)
-    look = np.flatnonzero(surface.seen if soft < LAST else surface.look if soft < FINE else surface.coarse)
+    look = np.flatnonzero(surface.seen if soft < LAST else surface.look)
     points = surface.between(now)[look]
     found, trust = matches(look, points, normal[look], tracked, reach)
     trust[~surface.look[look] & (found.distance > CLOSE)] = 0
@@ -138,7 +150,7 @@ def nearer(base, moved, surface: DrawnPoints, tracked: Tracked, anchors: Anchors
         at = np.zeros(len(now))
         at[surface.triangles[worse].ravel()] = 1
         smooth.stiffen(surface.rows.T @ at > 0.2)
-    return moved
+    return moved, float(robust @ np.abs(height)) / max(float(robust.sum()), 1e-12)
 
 
 def folded(before, after, triangles, limit: float = 0.0):

@@ -76,10 +76,11 @@ def lid_margins(reference: Head, rim, given, matrix, closed=()):
     pinch the lid there.
 
     matrix (3, 3) turns the reference into the scan's place; closed: sides of closed eyes, whose margins both pass midway
-    between the two. Returns vertices (k,), targets (k, 3).
+    between the two. Returns vertices (k,), targets (k, 3), and 0..1 (k,): 1 in an eye that is half or twice as open as
+    the reference's, or more unlike it, 0 in one as open.
     """
     v, rest = reference.skin.vertices, reference.landmark_positions()
-    rows, targets = [], []
+    rows, targets, changes = [], [], []
     for side in ("l", "r"):
         corners = [f"en_{side}", f"ex_{side}"]
         if not all(n in given and n in rest for n in corners):
@@ -90,6 +91,7 @@ def lid_margins(reference: Head, rim, given, matrix, closed=()):
         start, length = rest[corners[0]], np.linalg.norm(rest[corners[1]] - rest[corners[0]])
         goal, reach = given[corners[0]], np.linalg.norm(given[corners[1]] - given[corners[0]])
         scale = reach / length
+        change = 1.0 if side in closed else unlike(rest, given, side)
         for lid, mark in (("lower", f"pi_{side}"), ("upper", f"ps_{side}")):
             margin = _rim_of(reference, rim, f"lid_{lid}_{side}")
             if mark not in given or mark not in rest or len(margin) < 3:
@@ -108,9 +110,23 @@ def lid_margins(reference: Head, rim, given, matrix, closed=()):
             local[:, 2] += bulge * lift[1]
             rows.append(margin)
             targets.append(goal + scale * local @ new)
+            changes.append(np.full(len(margin), change))
     if not rows:
-        return np.zeros(0, dtype=int), np.zeros((0, 3))
-    return np.concatenate(rows), np.concatenate(targets)
+        return np.zeros(0, dtype=int), np.zeros((0, 3)), np.zeros(0)
+    return np.concatenate(rows), np.concatenate(targets), np.concatenate(changes)
+
+
+def opening(positions, side: str) -> float:
+    """How far an eye with the landmarks ``positions`` is open, against its length."""
+    top, bottom, inner, outer = (positions[f"{x}_{side}"] for x in ("ps", "pi", "en", "ex"))
+    return float(np.linalg.norm(top - bottom) / np.linalg.norm(inner - outer))
+
+
+def unlike(rest, given, side: str) -> float:
+    """0..1: by how many times an eye is more or less open than the reference's, ``rest``; 1 from two on."""
+    if not all(f"{x}_{side}" in p for x in ("ps", "pi") for p in (rest, given)):
+        return 1.0
+    return float(min(1.0, abs(np.log2(max(opening(given, side), 1e-6) / opening(rest, side)))))
 
 
 def closed_eyes(reference: Head, landmarks, given) -> list[str]:
@@ -121,12 +137,12 @@ def closed_eyes(reference: Head, landmarks, given) -> list[str]:
         names = [f"{x}_{side}" for x in ("ps", "pi", "en", "ex")]
         if all(n in given for n in names[:2]) and all(n in rest for n in (*names, "n", "gn")):
 
-            def opening(p, names=names):
+            def height(p, names=names):
                 along, up = p[names[3]] - p[names[2]], p["n"] - p["gn"]
                 up = up - (up @ along) / (along @ along) * along
                 return (p[names[0]] - p[names[1]]) @ up / (np.linalg.norm(up) * np.linalg.norm(along))
 
-            if opening(landmarks) < CLOSED * opening(rest):
+            if height(landmarks) < CLOSED * height(rest):
                 out.append(side)
     return out
 

@@ -18,6 +18,7 @@ from .fine_fit import Anchors, Fitted, fine_fit
 from .openings import closed_eyes, lid_margins, rim_anchors, rims
 from .refine import Pairs, refine
 from .shut_eyes import with_shut_eyes
+from .sliding import slide, spread_sites
 from .thin_plate_spline import ThinPlateSpline, similarity
 
 EAR_MARKS = ("sa", "sba", "pra", "pa", "obs", "obi", "t")
@@ -29,6 +30,9 @@ SHOWN = 0.7  # share of an ear with such data from which on it counts as seen
 CARRIED = 60.0  # smoothing of the first warp at a landmark that was not given, mm
 PICKED = 1.0  # the same at a given one, per mm of its uncertainty
 LID_MARKS = ("ps_l", "ps_r", "pi_l", "pi_r")
+LOOSE = 20.0  # how much less the shape of a lid's margin counts in an eye that is as open as the reference's
+REFINED = 1  # rounds of refinement: what is finer slides
+UNSURE = 0.25  # mm along the surface by which sliding may miss a landmark, per mm of smoothing
 HOLD = 0.15  # weight in the last stage of a landmark picked to 1 mm, against 1 for a point of data
 
 
@@ -107,11 +111,13 @@ def fit_skin(reference: Head, target: Surface, given: dict[str, np.ndarray]) -> 
     known = np.array([name in given for name in names])
     give = np.where(known, [PICKED * sigma(name) for name in names], CARRIED)
     rim = rims(reference)
-    turn, _ = similarity(marks, goal)
-    margin, margin_goal = lid_margins(reference, rim, given, turn, closed)
-    give[np.isin(names, LID_MARKS) & known] += CARRIED * (len(margin) > 0)
+    turn, shift = similarity(marks, goal)
+    margin, margin_goal, change = lid_margins(reference, rim, given, turn, closed)
+    pinched = change.max(initial=0.0)
+    give[np.isin(names, LID_MARKS) & known] += CARRIED * pinched
     margin, margin_goal = np.concatenate([margin, lips[0]]), np.concatenate([margin_goal, lips[1]])
-    give = np.concatenate([give, np.full(len(margin), PICKED)])
+    sure = np.concatenate([LOOSE ** (change - 1), np.ones(len(lips[0]))])
+    give = np.concatenate([give, PICKED / sure])
 
     yield Progress(0.0, "Warp to the landmarks")
     aim = np.concatenate([goal, margin_goal])
@@ -125,34 +131,40 @@ def fit_skin(reference: Head, target: Surface, given: dict[str, np.ndarray]) -> 
     pairs = Pairs(now, aim, give, len(names))
     unseen = unseen_ears(reference, given, moved, data)
     calm = refinable(reference, outer, rim | unseen)
-    work = refine(moved, calm, data, feature_triangles(reference, names), pairs)
+    work = refine(moved, calm, data, feature_triangles(reference, names), pairs, REFINED)
     warps = None
     while warps is None:
         try:
             done, _ = next(work)
-            yield Progress(0.05 + 0.35 * done, "Refine the landmarks")
+            yield Progress(0.05 + 0.2 * done, "Refine the landmarks")
         except StopIteration as stop:
             warps = stop.value
     for warp in warps:
         moved = warp.transform(moved)
 
+    rest = skin.vertices @ turn.T + shift
+    pairs = Pairs(np.concatenate([rows @ rest, rest[margin]]), aim, UNSURE * give, len(names))
+    sites = spread_sites(skin.vertices, calm, group(reference, "face") > 0.5)
+    yield Progress(0.25, "Slide over the scan")
+    moved = slide(rest, moved, outer, sites, data, pairs)
+
     free, stiffness = freedom(reference, given, rim, unseen)
     weight = np.where(known, [HOLD / sigma(name) ** 2 for name in names], 0.0)
-    weight[np.isin(names, LID_MARKS)] *= 0.1 if len(margin) else 1.0
+    weight[np.isin(names, LID_MARKS)] *= 1 - 0.9 * pinched
     matrix, _ = similarity(skin.vertices, moved)
     together = rim_anchors(reference, rim, matrix)
     on_margin = csr_matrix((np.ones(len(margin)), (np.arange(len(margin)), margin)), shape=(len(margin), n))
     anchors = Anchors(
         vstack([rows, on_margin, together.sampling]).tocsr(),
         np.concatenate([goal, margin_goal, together.target]),
-        np.concatenate([weight, np.full(len(margin), HOLD), together.weight]),
+        np.concatenate([weight, HOLD * sure**2, together.weight]),
     )
     start = undrawn(skin.faces, moved + (whole.skin.vertices - skin.vertices) @ matrix.T, moved)
     work = fine_fit(start, skin.faces, free, rim & ~unseen, data, anchors, stiffness)
     fitted = None
     while fitted is None:
         try:
-            yield Progress(0.4 + 0.6 * next(work), "Reach the scan")
+            yield Progress(0.3 + 0.7 * next(work), "Reach the scan")
         except StopIteration as stop:
             fitted = stop.value
     return SkinFit(whole, fitted, fitted.cage, landmarks, outer, target, closed, unseen, lips_closed)

@@ -9,7 +9,7 @@ from ..mesh import edges
 
 FINEST = 4.0  # most by which fine parts of the mesh are stiffened
 STRETCH = 0.002  # weight of first differences, which keeps the mesh from sliding where bending is free
-CLOSE = 1e-7  # energy of what is left, against that of the pulls, at which the system counts as solved
+CLOSE = 1e-5  # energy of what is left, against that of the pulls, at which the system counts as solved
 FOLDED = 6.0  # factor on the stiffness around a fold
 
 

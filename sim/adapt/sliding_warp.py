@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The warp through landmarks and through sites that may slide along the surface they were found on.
+
+The nearest place on a scan says how far apart two surfaces are, not which points belong together: such a pair holds
+across the surface, and along it the warp takes what is smoothest (semilandmarks that slide: Bookstein 1997; in three
+dimensions Gunz, Mitteroecker and Bookstein 2005). The displacement is estimated like a random field, a Gaussian process
+with a linear trend (Rasmussen and Williams 2006, equations 2.25 and 2.41), each observation with its own noise.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+from scipy.spatial.distance import cdist
+
+from .completion import AMPLITUDE
+from .thin_plate_spline import blocks
+
+TOGETHER = 40.0  # mm over which neighbouring features stray together
+
+
+def covariance(apart):
+    """Of displacements of points ``apart`` mm, mm²: Matérn's with one derivative, which has no cusp at a landmark."""
+    x = np.sqrt(3) / TOGETHER * apart
+    out = np.exp(-x)
+    x += 1
+    out *= x
+    out *= AMPLITUDE**2
+    return out
+
+
+@dataclass(frozen=True, eq=False)
+class SlidingWarp:
+    """A fitted warp: ``SlidingWarp.fit(...)``, then ``.transform(points)``.
+
+    centres (k, 3) mm; weights (k, 3); matrix (3, 3) and shift (3,) mm of the trend, which is added to the point itself
+    """
+
+    centres: np.ndarray
+    weights: np.ndarray
+    matrix: np.ndarray
+    shift: np.ndarray
+
+    @classmethod
+    def fit(cls, marks, goals, frames, noise, sites, places, normals, slack) -> "SlidingWarp":
+        """The warp that takes landmarks ``marks`` (k, 3) near ``goals`` (k, 3), and ``sites`` (m, 3) near the planes
+        through ``places`` (m, 3) with unit ``normals`` (m, 3); all mm.
+
+        frames (k, 3, 3) : orthonormal rows, the axes along which a landmark is as unsure as ``noise`` (k, 3) says; slack
+        (m,) : the same of a site along its normal; mm, one standard deviation. Four landmarks or more, not coplanar.
+        """
+        k, m = len(marks), len(sites)
+        at = np.concatenate([marks, sites])
+        middle, size = at.mean(axis=0), np.ptp(at, axis=0).max()
+        # A landmark is observed along three axes, a site along one.
+        way = np.concatenate([frames.reshape(-1, 3), normals])
+        of = np.concatenate([np.repeat(np.arange(k), 3), k + np.arange(m)])
+        seen = np.einsum("ij,ij->i", np.concatenate([goals - marks, places - sites])[of], way)
+        table = covariance(cdist(at, at))[np.ix_(of, of)]
+        table *= way @ way.T
+        table[np.diag_indices_from(table)] += np.concatenate([noise.ravel(), slack]) ** 2
+        terms = np.column_stack([np.ones(k + m), (at - middle) / size])
+        trend = (way[:, :, None] * terms[of][:, None]).reshape(len(of), 12)
+        factor = cho_factor(table, overwrite_a=True, check_finite=False)
+        rest = cho_solve(factor, np.column_stack([trend, seen]), check_finite=False)
+        linear = np.linalg.solve(trend.T @ rest[:, :12], trend.T @ rest[:, 12])
+        strength = rest[:, 12] - rest[:, :12] @ linear
+        weights = np.zeros((k + m, 3))
+        np.add.at(weights, of, way * strength[:, None])
+        linear = linear.reshape(3, 4)
+        matrix = linear[:, 1:] / size
+        return cls(at, weights, matrix, linear[:, 0] - matrix @ middle)
+
+    def transform(self, points) -> np.ndarray:
+        """Warped points (k, 3), computed in blocks so that memory stays small."""
+        points = np.asarray(points, dtype=float)
+        out = points + points @ self.matrix.T + self.shift
+        for part in blocks(len(points), len(self.centres)):
+            out[part] += covariance(cdist(points[part], self.centres)) @ self.weights
+        return out
