@@ -21,10 +21,11 @@ from .tracked import Tracked
 
 #: One round each: stiffness of bending, reach in mm, width in mm of what counts as an outlier. The last may be repeated.
 SCHEDULE = (
-    (1.0, 9.0, 3.0),
-    (0.25, 6.0, 2.0),
-    (0.06, 5.0, 1.5),
-    (0.015, 4.0, 1.2),
+    (4.0, 12.0, 4.0),
+    (0.6, 9.0, 3.0),
+    (0.12, 6.0, 2.0),
+    (0.04, 5.0, 1.2),
+    (0.015, 4.0, 1.0),
     (0.005, 4.0, 1.0),
 )
 ALONG = 0.02  # weight of a pull along the surface against one across it

@@ -32,7 +32,7 @@ PICKED = 1.0  # the same at a given one, per mm of its uncertainty
 LID_MARKS = ("ps_l", "ps_r", "pi_l", "pi_r")
 LOOSE = 20.0  # how much less the shape of a lid's margin counts in an eye that is as open as the reference's
 REFINED = 1  # rounds of refinement: what is finer slides
-UNSURE = 0.25  # mm along the surface by which sliding may miss a landmark, per mm of smoothing
+UNSURE = 0.3  # mm along the surface by which sliding may miss a landmark, per mm of smoothing
 HOLD = 0.15  # weight in the last stage of a landmark picked to 1 mm, against 1 for a point of data
 
 
