@@ -6,14 +6,16 @@ import pytest
 from scipy.spatial import cKDTree
 
 from headshop.sim.acting.arkit import poses
-from headshop.sim.acting.pose import Pose, control
+from headshop.sim.acting.pose import Pose, control, pose_from
 from headshop.sim.anatomy.inside import inside
 from headshop.sim.mesh import Mesh
 from headshop.sim.mesh_subdivision import limit, smoother, subdivision
 from headshop.sim.tissue.clearing import PAIRS, cleared, surfaces_of
 from headshop.sim.tissue.drawn_samples import drawn_samples, planes_of
 from headshop.sim.tissue.energy import pose_of
+from headshop.sim.tissue.frames import Frames
 from headshop.sim.tissue.gingiva import attached
+from headshop.sim.tissue.lid_meeting import gap_between
 from headshop.sim.tissue.lids import eyeball_radius
 from headshop.sim.tissue.model import build_model
 from headshop.sim.tissue.planes import row_depths, row_energy
@@ -149,3 +151,20 @@ def test_lids_go_a_little_with_a_sideways_gaze(model, reference):
     for side in "lr":
         assert 0.4 < at[f"ps_{side}"][0] < 2.5 and 0.2 < at[f"pi_{side}"][0] < 2.5
         assert abs(at[f"en_{side}"][0]) < 0.4 and abs(at[f"ex_{side}"][0]) < 0.4
+
+
+def _without_the_last_move(model, asked):
+    frames = Frames(model)
+    frames.follow(asked, 150, 0.005)
+    return frames._at[: model.count]
+
+
+def test_shut_lids_meet_where_they_are_drawn(reference, model):
+    both = control(model, pose_from({"blink_l": 1.0, "blink_r": 1.0}))
+    skin = solve(model, both).state.skin
+    held = _without_the_last_move(model, both)
+    for lids in model.lids:
+        between = lids.opening > 0.02
+        radius = lids.eye.radius
+        assert gap_between(lids, skin)[0][between].max() * radius < 0.05
+        assert gap_between(lids, held)[0][between].max() * radius > 0.2  # what the tissue holds them apart

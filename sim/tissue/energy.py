@@ -16,6 +16,7 @@ from . import contact
 from .axes import per_axis
 from .drawn_contact import drawn_contacts, on_the_ball
 from .jaw import jaw_transform
+from .lid_meeting import shut_share
 from .lids import lid_targets
 from .muscle_field import turned_lips
 from .planes import Planes, contact_energy, joined, row_energy
@@ -32,7 +33,8 @@ class Pose:
 
     reference (3 n, 3): posed rest; rotation, translation of the mandible; pull (e, 3), push (e,), reach (e,), node (e,)
     of the active muscle entries and of the air in the mouth; lid_node (v,), lid_goal (v, 3), lid_stiffness (v,);
-    gaze (2, 2) of left and right eye; seal 0..1 of the lips; load (3, 2 n) outer forces on epidermis and fascia in the unit
+    gaze (2, 2) of left and right eye; seal 0..1 of the lips; shut (2,) 0..1 how far each
+    eye's lids count as shut; load (3, 2 n) outer forces on epidermis and fascia in the unit
     of stiffness times mm, or None.
     """
 
@@ -48,6 +50,7 @@ class Pose:
     lid_stiffness: np.ndarray
     gaze: np.ndarray
     seal: float
+    shut: np.ndarray
     load: np.ndarray | None = None
 
     def gaze_of(self, side: str) -> np.ndarray:
@@ -103,6 +106,7 @@ def pose_of(model: Model, control: Control, lid_goal: np.ndarray | None = None) 
         lid_stiffness=model.parameters.lid * lid_hold,
         gaze=np.array([control.gaze_of(side) for side in "lr"]),
         seal=float(np.clip(control.seal, 0, 1)),
+        shut=_shut(model, control),
         load=load_at(model, control.around, reference),
     )
 
@@ -134,6 +138,13 @@ def _lid_offset(model: Model, lids) -> np.ndarray:
 def _lids_of(model: Model, control: Control):
     closure = np.asarray(control.lids, float).reshape(2, 2)
     return [closure["lr".index(lids.side)] for lids in model.lids]
+
+
+def _shut(model: Model, control: Control) -> np.ndarray:
+    shut = np.zeros(2)
+    for lids, closure in zip(model.lids, _lids_of(model, control), strict=True):
+        shut["lr".index(lids.side)] = shut_share(lids, closure)
+    return shut
 
 
 def bending_stiffness(model: Model) -> float:

@@ -11,6 +11,7 @@ import numpy as np
 from .clearing import cleared, way_out
 from .drawn_contact import CLEAR
 from .energy import Pose, energy_gradient, find_contacts, pose_of
+from .lid_meeting import met
 from .solver import descend, factorised, minimise, rest_state
 from .structures import Control, Model, State
 
@@ -55,6 +56,7 @@ class Frames:
         self.converged = self.residual <= tolerance
         self._at = positions
         # contact keeps a little off: what is nearer has not gone through
+        positions = met(model, pose.shut, positions)
         out = way_out(planes, positions, model.layers.free[: model.count], CLEAR)
         if out is not None:
             positions = positions.copy()

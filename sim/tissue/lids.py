@@ -156,7 +156,7 @@ def build_lids(head: Head, layers: Layers, side: str) -> Lids | None:
     if lids.awake:  # the skin of lids scanned shut lies spread already
         spread = relief(lids, flat, root, length, near, lambda points: eyeball_radius(lids, points, np.zeros(2)))
         lids = replace(lids, relief=spread)
-    return replace(lids, seal=_seal(lids, head, surface, within))
+    return replace(lids, seal=_seal(lids, head, surface, within), edge=surface, within=within)
 
 
 def _seal(lids: Lids, head: Head, surface: LidEdge, within) -> np.ndarray:

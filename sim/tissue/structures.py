@@ -111,6 +111,7 @@ class Lids:
     lower_share (v,) share of the opening that the lower lid covers in a blink
     relief (v, 3) mm by which shut lids lie otherwise than plain turning would have it
     seal (v,) rad by which each lid goes on when closed, until the limit surfaces meet
+    edge : `lid_edges.LidEdge`, the drawn edges, or None; within (v,) mm along the lid where each vertex meets the other lid
     profile : (b,) eyeball radius over the angle from the gaze, `profile_angle` (b,)
     """
 
@@ -138,6 +139,8 @@ class Lids:
     clearance: np.ndarray
     profile_angle: np.ndarray
     profile: np.ndarray
+    edge: Any = None  # lid_edges.LidEdge
+    within: np.ndarray | None = None
 
 
 @dataclass(frozen=True, eq=False)
