@@ -206,6 +206,7 @@ def _solve(skin, values, iterations) -> _Following | None:
         posed = posed_parts(following.model, following.state, wanted)
     else:  # rest is the scan itself, exactly
         following.state, posed = following.acting.rest_state(following.model), following.neutral
+        following.frames = following.acting.follower(following.model)  # what comes next begins here, undone or not
     objects = heads.parts_of(skin)
     for part, vertices in posed.items():
         _write(skin, objects[part], vertices - following.neutral[part])
@@ -258,6 +259,7 @@ def _on_history(*_):
     """After undo, redo or loading a file the cache may speak of other heads; the fingerprint decides."""
     for number, following in list(_following.items()):
         following.pose = None
+        following.frames = following.acting.follower(following.model)
         if following.acting is INSTANT:  # what was learnt may be another now
             del _following[number]
     for skin in heads.find_heads(bpy.context.scene):

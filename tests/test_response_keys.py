@@ -14,6 +14,7 @@ from headshop.sim.progress import finish
 from headshop.sim.response import fit, formula, keys, playing, quantities, sampling, storage
 from headshop.sim.response.actor import actor_of
 from headshop.sim.response.formula import of
+from headshop.sim.response.jaw_frame import JawFrame
 from headshop.sim.tissue.solver import solve
 
 ZYGOMATICUS, LEVATOR = "zygomaticus_major_l", "levator_labii_superioris_l"
@@ -140,7 +141,7 @@ def test_a_file_plays_the_simulation_without_the_extension(bpy, chosen, referenc
             linear = np.linalg.norm(reference.skin.vertices + plain - truth, axis=1)
             assert np.sqrt((off**2).mean()) < limit < np.sqrt((linear**2).mean()), (number, (off**2).mean() ** 0.5)
         lowered = played["Mandible3"] - played["Mandible0"]  # a muscle of the jaw moves bone and skin through the jaw
-        frame = storage.frame_of(reference)
+        frame = JawFrame(reference.skin.vertices, np.asarray(reference.groups["jaw"], float), reference.jaw)
         asked = control(reference_model, Pose({"digastricus_l": 1.0}))
         rigid = frame.placed(np.zeros_like(frame.rest), asked.jaw) - frame.rest
         assert np.abs(lowered).max() > 5 and np.abs(played["Skin3"] - played["Skin0"]).max() > 5
