@@ -27,6 +27,7 @@ from headshop.sim.anatomy.teeth import crowns
 from headshop.sim.mesh_subdivision import smoother
 from headshop.sim.tissue.energy import pose_of
 from headshop.sim.tissue.gingiva import attached
+from headshop.sim.tissue.lid_meeting import gap_between
 from headshop.sim.tissue.lids import eyeball_radius
 from headshop.sim.tissue.model import build_model
 from headshop.sim.tissue.solver import rest_state, solve
@@ -131,6 +132,13 @@ class Ruler:
         return float(surface.closest(skin[self.lips[0]]).distance.min())
 
 
+def lid_gap(model) -> float:
+    """mm: the largest gap that a blink leaves between the drawn edges of the lids; 0 where they overlap all along."""
+    skin = solve(model, control(model, Pose(blink_l=1.0, blink_r=1.0)), max_iterations=200).state.skin
+    between = [lids.eye.radius * gap_between(lids, skin)[0][lids.opening > 0.02].max() for lids in model.lids]
+    return max(0.0, *map(float, between))
+
+
 def main():
     """Measure, print."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
@@ -180,8 +188,10 @@ def main():
     out["inverted_prisms_max"] = max(row[4] for row in rows)
     pressed = solve(model, control(model, CLOSED), max_iterations=200).state.positions
     out["lip_gap_pbm_mm"] = round(ruler.lip_gap(pressed), 3)
+    out["lid_gap_mm"] = round(lid_gap(model), 3)
     print(f"volume drift at most {drift.max():.2%}; inverted prisms at most {out['inverted_prisms_max']}", end="; ")
-    print(f"at rest {out['at_rest']} of {len(rows)}; lips apart on /p b m/ {out['lip_gap_pbm_mm']} mm")
+    print(f"at rest {out['at_rest']} of {len(rows)}; lips apart on /p b m/ {out['lip_gap_pbm_mm']} mm", end="; ")
+    print(f"drawn edges of shut lids apart by at most {out['lid_gap_mm']} mm")
     print(json.dumps(out))
 
 
