@@ -26,9 +26,8 @@ from headshop.sim.anatomy.storage import load_head
 from headshop.sim.anatomy.teeth import crowns
 from headshop.sim.mesh_subdivision import smoother
 from headshop.sim.tissue.energy import pose_of
+from headshop.sim.tissue.eye_surface import eyeball_radius
 from headshop.sim.tissue.gingiva import attached
-from headshop.sim.tissue.lid_meeting import gap_between
-from headshop.sim.tissue.lids import eyeball_radius
 from headshop.sim.tissue.model import build_model
 from headshop.sim.tissue.solver import rest_state, solve
 
@@ -135,7 +134,9 @@ class Ruler:
 def lid_gap(model) -> float:
     """mm: the largest gap that a blink leaves between the drawn edges of the lids; 0 where they overlap all along."""
     skin = solve(model, control(model, Pose(blink_l=1.0, blink_r=1.0)), max_iterations=200).state.skin
-    between = [lids.eye.radius * gap_between(lids, skin)[0][lids.opening > 0.02].max() for lids in model.lids]
+    between = [
+        lids.eye.radius * lids.edge.gap(skin, lids.upper, lids.within)[lids.opening > 0.02].max() for lids in model.lids
+    ]
     return max(0.0, *map(float, between))
 
 

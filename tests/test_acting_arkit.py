@@ -7,7 +7,6 @@ import pytest
 from headshop.sim.acting import arkit
 from headshop.sim.acting.pose import Pose, combined, control
 from headshop.sim.mesh import vertex_normals
-from headshop.sim.tissue.model import build_model
 from headshop.sim.tissue.posing import posed_parts
 from headshop.sim.tissue.solver import solve
 
@@ -22,19 +21,14 @@ WHOLE = (
 
 
 @pytest.fixture(scope="module")
-def model(reference):
-    return build_model(reference)
-
-
-@pytest.fixture(scope="module")
-def moved(model, reference):
+def moved(reference_model, reference):
     """Pose -> motion (n, 3) mm of the skin."""
-    return lambda pose: solve(model, control(model, pose)).state.skin - reference.skin.vertices
+    return lambda pose: solve(reference_model, control(reference_model, pose)).state.skin - reference.skin.vertices
 
 
-def gap(model, reference, motion):
+def gap(reference_model, reference, motion):
     """mm by which the points of the lips that touch at rest have come apart, in the mean."""
-    skin, seal = reference.skin.vertices + motion, model.seal
+    skin, seal = reference.skin.vertices + motion, reference_model.seal
     return np.linalg.norm(skin[seal.lower] - skin[seal.upper] - seal.offset, axis=1).mean()
 
 
@@ -50,7 +44,7 @@ def test_all_shapes_of_apple_and_no_others(reference):
     assert set(arkit.over()) | set(arkit.over().values()) <= names
 
 
-def test_right_shapes_mirror_the_left_ones(model, reference, moved):
+def test_right_shapes_mirror_the_left_ones(reference_model, reference, moved):
     poses = arkit.poses()
     assert poses["jawRight"].jaw_side == -poses["jawLeft"].jaw_side != 0
     assert poses["eyeLookInRight"].gaze_r_x == -poses["eyeLookInLeft"].gaze_l_x != 0
@@ -61,9 +55,11 @@ def test_right_shapes_mirror_the_left_ones(model, reference, moved):
     assert np.abs(left - right[twin] * [-1, 1, 1]).max() < 0.1
 
 
-def test_lips_are_held_together_over_an_open_jaw(model, reference, moved):
+def test_lips_are_held_together_over_an_open_jaw(reference_model, reference, moved):
     opened = Pose(jaw_open=0.6)
-    apart, held = (gap(model, reference, moved(pose)) for pose in (opened, combined(opened, Pose(lips_together=1.0))))
+    apart, held = (
+        gap(reference_model, reference, moved(pose)) for pose in (opened, combined(opened, Pose(lips_together=1.0)))
+    )
     assert apart > 12 and held < 1
 
 
@@ -90,9 +86,9 @@ def test_air_puffs_and_sucks_the_cheeks(reference, moved):
     assert out > 2 and into < -0.5
 
 
-def test_one_eye_turns_alone(model, reference):
-    asked = control(model, Pose(gaze_l_z=-1.0))
-    parts = posed_parts(model, solve(model, asked).state, asked)
+def test_one_eye_turns_alone(reference_model, reference):
+    asked = control(reference_model, Pose(gaze_l_z=-1.0))
+    parts = posed_parts(reference_model, solve(reference_model, asked).state, asked)
     assert parts["eye_r"] == pytest.approx(reference.parts["eye_r"].vertices, abs=1e-9)
     assert np.abs(parts["eye_l"] - reference.parts["eye_l"].vertices).max() > 2
     motion = parts["skin"] - reference.skin.vertices
@@ -100,9 +96,9 @@ def test_one_eye_turns_alone(model, reference):
     assert left > 2 and right < 0.1
 
 
-def test_the_tongue_comes_out_over_the_lower_teeth(model, reference):
-    asked = control(model, arkit.poses()["tongueOut"])
-    parts = posed_parts(model, solve(model, asked).state, asked)
+def test_the_tongue_comes_out_over_the_lower_teeth(reference_model, reference):
+    asked = control(reference_model, arkit.poses()["tongueOut"])
+    parts = posed_parts(reference_model, solve(reference_model, asked).state, asked)
     tip = parts["tongue"][np.argmin(parts["tongue"][:, 1])]
     assert tip[1] < parts["skin"][:, 1][reference.groups["lip_lower"] > 0.5].min()  # in front of the lip
     teeth = parts["teeth_lower"][np.abs(parts["teeth_lower"][:, 0]) < 6]

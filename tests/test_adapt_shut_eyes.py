@@ -20,7 +20,7 @@ from headshop.sim.mesh_subdivision import drawn, smoother
 from headshop.sim.progress import finish
 from headshop.sim.scan.individual import draw_field
 from headshop.sim.scan.viewpoint import Viewpoint, depth_map
-from headshop.sim.tissue.lids import lid_targets
+from headshop.sim.tissue.lid_targets import lid_targets
 from headshop.sim.tissue.model import build_model
 
 BOTH = ("l", "r")

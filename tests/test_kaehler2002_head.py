@@ -10,12 +10,12 @@ from headshop.sim.acting.pose import Pose, control
 from headshop.sim.errors import InputError
 from headshop.sim.relax.responses import mirrored_vertices
 from headshop.sim.tissue.contact import bone_planes
+from headshop.sim.tissue.eye_surface import eyeball_radius
 from headshop.sim.tissue.jaw import jaw_transform
 from headshop.sim.tissue.kaehler2002.leapfrog import DivergedError
 from headshop.sim.tissue.kaehler2002.model import build_model
 from headshop.sim.tissue.kaehler2002.posed import muscle_shapes, pose_of
 from headshop.sim.tissue.kaehler2002.solver import rest_state, solve, step
-from headshop.sim.tissue.lids import eyeball_radius
 from headshop.sim.tissue.planes import depths
 
 LOOSE = 0.1  # mm, where a test asks for centimetres

@@ -21,7 +21,7 @@ from headshop.sim.errors import InputError
 from headshop.sim.health.cuts import smooth_skin
 from headshop.sim.mesh_piercing import piercings
 from headshop.sim.mesh_subdivision import limit
-from headshop.sim.tissue.lids import gaze_direction, gaze_rotation
+from headshop.sim.tissue.eye_surface import gaze_direction, gaze_rotation
 
 #: Columns of the eye rings between the lacrimal lake and the outer corner.
 ON_BALL = [*range(5, 14), *range(15, 24)]

@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 from headshop.sim.anatomy.head import Eye, Jaw
+from headshop.sim.tissue.eye_surface import gaze_direction
 from headshop.sim.tissue.geometry import Surface, closest_on_triangles
 from headshop.sim.tissue.jaw import jaw_transform, opening_mm
-from headshop.sim.tissue.lids import gaze_direction
 from headshop.sim.tissue.muscle_field import fibre_coordinates, theta_1, theta_2
 from headshop.sim.tissue.springs import assemble, spring_energy
 from headshop.sim.tissue.volume import corner_gather, prism_volumes, volume_energy, volume_forces

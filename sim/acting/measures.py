@@ -6,8 +6,8 @@ import numpy as np
 from ..mesh import vertex_normals
 from ..tissue import contact
 from ..tissue.arch import arch_contacts
+from ..tissue.eye_surface import depth_in_eyeballs
 from ..tissue.jaw import jaw_transform
-from ..tissue.lids import depth_in_eyeballs
 from ..tissue.planes import depths, joined
 from ..tissue.structures import Control
 from ..tissue.volume import prism_volumes

@@ -9,9 +9,11 @@ from scipy.spatial.transform import Rotation
 
 from ..anatomy.eyeball import turned_eye
 from ..anatomy.head import JAW_PARTS, Head
+from ..tissue.eye_surface import gaze_rotation
 from ..tissue.jaw import jaw_transform
 from ..tissue.layers import build_layers
-from ..tissue.lids import build_lids, gaze_rotation, lid_targets
+from ..tissue.lid_targets import lid_targets
+from ..tissue.lids import build_lids
 from ..tissue.parameters import DEFAULT
 
 #: Share of the jaw's way aside that the lips go together: in the middle, and how much more at the corner the jaw goes

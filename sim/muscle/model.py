@@ -18,7 +18,8 @@ from ..mesh import vertex_normals
 from ..tissue.contact import Surfaces, build_surfaces
 from ..tissue.geometry import cotangent_stiffness, short_diagonals, smoothed
 from ..tissue.layers import build_layers, sheet_ties
-from ..tissue.lids import build_lids, lid_targets
+from ..tissue.lid_targets import lid_targets
+from ..tissue.lids import build_lids
 from ..tissue.model import strengths
 from ..tissue.muscle_field import JAW_MUSCLES, LID_MUSCLES, base_name
 from ..tissue.parameters import DEFAULT

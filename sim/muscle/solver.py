@@ -10,7 +10,7 @@ from ..mesh import vertex_normals
 from ..tissue.arch import arch_contacts
 from ..tissue.contact import eye_planes, lip_contacts, sheet_contacts
 from ..tissue.jaw import jaw_transform
-from ..tissue.lids import lid_targets
+from ..tissue.lid_targets import lid_targets
 from ..tissue.planes import joined, project
 from ..tissue.structures import Control, Solution
 from .confluence import sharing

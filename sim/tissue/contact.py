@@ -16,9 +16,9 @@ from scipy.spatial import cKDTree
 from ..anatomy.head import Head
 from ..mesh import vertex_normals
 from .arch import Arch, build_arches
+from .eye_surface import eyeball_radius
 from .geometry import short_diagonals
 from .layers import Layers
-from .lids import eyeball_radius
 from .planes import Planes, empty_planes
 
 _LIP_REACH = 6.0

@@ -16,9 +16,9 @@ from ..anatomy.head import Head
 from ..mesh import vertex_normals
 from .arch import Arch, wall_planes
 from .drawn_samples import SPACING, Samples, drawn_samples, planes_of
+from .eye_surface import eyeball_radius
 from .geometry import short_diagonals
 from .gingiva import attached
-from .lids import eyeball_radius
 from .planes import Planes
 from .solids import Solid, build_solid
 from .structures import Layers, Lids

@@ -17,7 +17,7 @@ from .axes import per_axis
 from .drawn_contact import drawn_contacts, on_the_ball
 from .jaw import jaw_transform
 from .lid_meeting import shut_share
-from .lids import lid_targets
+from .lid_targets import lid_targets
 from .muscle_field import turned_lips
 from .planes import Planes, contact_energy, joined, row_energy
 from .seal import seal_energy

@@ -48,6 +48,16 @@ class LidEdge:
         best = np.where(upper[self.rows], angle.argmin(axis=0), angle.argmax(axis=0))[None]
         return np.take_along_axis(a, best, 0)[0], np.take_along_axis(angle, best, 0)[0]
 
+    def gap(self, vertices, upper, within):
+        """(v,) rad from the lower up to the upper edge at each place ``within`` (v,) mm along the lid, less than 0 where
+        they overlap.
+        """
+        at, level = self.reach(vertices, upper)
+        of_upper = upper[self.rows]
+        order = np.argsort(at, kind="stable")
+        high, low = order[of_upper[order]], order[~of_upper[order]]
+        return np.interp(within, at[high], level[high]) - np.interp(within, at[low], level[low])
+
 
 def strips(pair, column, start, points) -> tuple[np.ndarray, np.ndarray]:
     """(v,) for each lid vertex the entry of ``start`` (rows on the margin) whose strip across the lid it belongs to, and

@@ -34,25 +34,13 @@ def met(model: Model, shut, positions) -> np.ndarray:
     return positions
 
 
-def gap_between(lids, skin) -> tuple[np.ndarray, np.ndarray]:
-    """(v,) rad between the drawn edges of upper and lower lid where each lid vertex is, negative where they overlap, and
-    (k,) mm along the lid of the edge's points.
-
-    skin : (n, 3) mm
-    """
-    at, level = lids.edge.reach(skin, lids.upper)
-    upper = lids.upper[lids.edge.rows]
-    within = np.clip(lids.within, at.min(), at.max())
-    return _along(at[upper], level[upper], within) - _along(at[~upper], level[~upper], within), at
-
-
 def _met(lids, share, positions):
     positions = positions.copy()
     column, eye = lids.column, lids.eye
     way = np.where(lids.upper, -0.5, 0.5) * lids.weight * (lids.opening > 0.02) * share
     left = np.full(len(column), MOST / eye.radius)
     for _ in range(ROUNDS):
-        gap, _ = gap_between(lids, positions)
+        gap = lids.edge.gap(positions, lids.upper, lids.within)
         turn = np.clip(gap + OVERLAP / eye.radius, 0, left)
         if not turn.any():
             break
@@ -64,8 +52,3 @@ def _met(lids, share, positions):
         positions[column] += (cos * forward - sin * up)[:, None] * lids.forward
         positions[column] += (sin * forward + cos * up)[:, None] * lids.up
     return positions
-
-
-def _along(x, y, at):
-    order = np.argsort(x, kind="stable")
-    return np.interp(at, x[order], y[order])

@@ -5,8 +5,8 @@ import numpy as np
 
 from ..anatomy.eyeball import turned_eye
 from ..anatomy.head import JAW_PARTS
+from .eye_surface import gaze_rotation
 from .jaw import jaw_transform
-from .lids import gaze_rotation
 from .structures import Control, Model, State
 from .tongue import tongue_out
 

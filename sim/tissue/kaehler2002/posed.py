@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..jaw import jaw_transform
-from ..lids import lid_targets
+from ..lid_targets import lid_targets
 from ..structures import Control
 from .bulge import rise
 from .fibres import arc_lengths, contracted

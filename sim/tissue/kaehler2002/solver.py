@@ -7,7 +7,7 @@ to muscle is left out, as in the paper. In `step` the feet go to where the contr
 
 import numpy as np
 
-from ..lids import depth_in_eyeballs
+from ..eye_surface import depth_in_eyeballs
 from ..planes import Planes, depths, project
 from ..structures import Control, Solution, State
 from .forces import contact_stiffness, energy_gradient, find_contacts, stiffness_at

@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from ..lids import depth_in_eyeballs
+from ..eye_surface import depth_in_eyeballs
 from ..planes import depths
 from ..volume import prism_volumes
 from .motion import barriers

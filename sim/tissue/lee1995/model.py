@@ -10,7 +10,8 @@ from ...mesh import vertex_normals
 from .. import contact
 from ..geometry import short_diagonals
 from ..layers import sheet_ties
-from ..lids import build_lids, lid_targets
+from ..lid_targets import lid_targets
+from ..lids import build_lids
 from ..model import strengths as shipped_table
 from ..parameters import DEFAULT as SHARED
 from .attachment import build_attachments

@@ -7,7 +7,7 @@ import numpy as np
 
 from ..energy import posed_reference
 from ..jaw import jaw_transform
-from ..lids import lid_targets
+from ..lid_targets import lid_targets
 from ..structures import Control
 from .structures import LeeModel
 from .volume import turned_rest
