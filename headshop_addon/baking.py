@@ -10,7 +10,7 @@ from ..sim.acting import arkit, expressions, outer
 from ..sim.acting.models import DEFAULT
 from ..sim.errors import InputError
 from ..sim.progress import Work, portion
-from . import head_place, heads, performance, shape_keys
+from . import head_place, heads, performance, rig_keys, shape_keys
 from .provenance import timed, versions
 
 SETS = ("expressions", "muscles", "arkit")
@@ -49,11 +49,10 @@ def bake(
     shapes = acting = None
     if pose_set == RIG:
         from .response import require_own_model
-        from .rig_keys import bake_rig
 
         require_own_model(model)
         with timed(seconds, "bake_rig"):
-            report["rig"] = yield from portion(bake_rig(skin), 0.0, border)
+            report["rig"] = yield from portion(rig_keys.bake_rig(skin), 0.0, border)
     elif pose_set is not None:
         with timed(seconds, f"bake_{pose_set}"):
             poses, over = poses_of_set(skin, pose_set)
@@ -93,6 +92,31 @@ def bake_acted(
     scene.render.fps, scene.render.fps_base = round(acted.fps), round(acted.fps) / acted.fps
     scene.frame_start, scene.frame_end = 1, max(len(poses), 1)
     return report
+
+
+def is_baked(skin: bpy.types.Object) -> bool:
+    """Whether shapes, a rig or a performance were baked onto the head."""
+    return bool(shape_keys.baked_names(skin)) or any(
+        performance.PERFORMANCE in obj for obj in heads.parts_of(skin).values()
+    )
+
+
+def remove_baked(skin: bpy.types.Object) -> None:
+    """Take baked shapes, rig and performance off a head; the artist's own shape keys stay, and the sliders move the face.
+
+    Raises
+    ------
+    InputError : linked from another file.
+    """
+    shape_keys.require_editable(skin)
+    moved = rig_keys.is_rigged(skin) or performance.PERFORMANCE in skin
+    rig_keys.remove_rig(skin)
+    performance.remove_performance(skin)
+    for obj in heads.parts_of(skin).values():
+        shape_keys.remove_keys(obj, shape_keys.baked_names(obj))
+    settings = getattr(skin, "headshop", None)
+    if settings is not None and moved:  # `Live` was switched off for what moved the face instead
+        settings.live = True
 
 
 def summary(report: dict) -> str:

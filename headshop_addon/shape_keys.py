@@ -175,12 +175,6 @@ def remove_keys(obj: bpy.types.Object, names) -> None:
         obj.shape_key_remove(keys.key_blocks[0])
 
 
-def remove_baked(skin: bpy.types.Object) -> None:
-    """Take all baked shape keys off a head; the artist's own stay."""
-    for obj in heads.parts_of(skin).values():
-        remove_keys(obj, baked_names(obj))
-
-
 def follow(block: bpy.types.ShapeKey, keys: bpy.types.Key, name: str) -> None:
     """Drive a key's value by the value of ``keys``' key ``name`` (a sum of one variable: no Python is run)."""
     block.driver_remove("value")

@@ -39,8 +39,10 @@ class HEADSHOP_PT_bake(SidebarPanel, bpy.types.Panel):
             from ..headshop_addon.shape_keys import baked_names
 
             count = len(baked_names(skin))
+            row = layout.row(align=True)
             if count:
-                layout.label(text=f"{count} shapes baked", icon="CHECKMARK")
+                row.label(text=f"{count} shapes baked", icon="CHECKMARK")
+            row.operator("headshop.remove_baked", icon="X")
         column = layout.column(align=True)
         column.operator("headshop.render_sheet", icon="RENDER_STILL")
         column.operator("headshop.export_head", icon="EXPORT")

@@ -68,6 +68,11 @@ def test_the_operator_takes_the_motion_of_the_object(addon, skin):
     assert keys is not None and len(keys.key_blocks) > 1
     scene.frame_set(3)
     assert skin.matrix_world.translation.z == pytest.approx(0.05, abs=1e-4)  # the artist's own keys stay
+    assert not skin.headshop.live
+    assert addon.ops.headshop.remove_baked() == {"FINISHED"}
+    assert skin.data.shape_keys is None and skin.headshop.live
+    assert skin.matrix_world.translation.z == pytest.approx(0.05, abs=1e-4)
+    assert not addon.ops.headshop.remove_baked.poll()
 
 
 def test_only_what_moves_bakes_with_dynamics(skin):

@@ -48,7 +48,7 @@ def test_parts_follow_the_skin_without_python(bpy, skin, shape_keys, reference):
 
 
 def test_baking_again_replaces_only_ours(skin, shape_keys, reference):
-    from headshop.headshop_addon import bridge, heads
+    from headshop.headshop_addon import baking, bridge, heads
 
     bridge.ensure_shape_key(skin, "sculpted")
     shape_keys.write_shapes(skin, {k: deltas(reference, "skin", "mandible") for k in ("joy", "fear")}, {})
@@ -59,7 +59,7 @@ def test_baking_again_replaces_only_ours(skin, shape_keys, reference):
     assert skin.data.shape_keys.key_blocks["joy"].value == 0.5
     moved = bridge.read_positions(skin, "joy") - reference.skin.vertices
     np.testing.assert_allclose(moved, 3.0, atol=1e-3)
-    shape_keys.remove_baked(skin)
+    baking.remove_baked(skin)
     assert names(skin) == ["Basis", "sculpted"] and names(heads.parts_of(skin)["mandible"]) == []
 
 
@@ -133,7 +133,7 @@ def test_linked_heads_are_refused(bpy, skin, shape_keys, tmp_path):
 
 
 def test_the_face_as_scanned_stays_beside_what_is_baked(skin, shape_keys, reference):
-    from headshop.headshop_addon import bridge, heads
+    from headshop.headshop_addon import baking, bridge, heads
 
     smiling = reference.skin.vertices + 1.5
     shape_keys.keep_as_scanned(skin, smiling)
@@ -142,6 +142,6 @@ def test_the_face_as_scanned_stays_beside_what_is_baked(skin, shape_keys, refere
     np.testing.assert_allclose(bridge.read_positions(skin, shape_keys.SCANNED), smiling, atol=1e-3)
     np.testing.assert_allclose(heads.read_head(skin).skin.vertices, reference.skin.vertices, atol=1e-3)
     shape_keys.write_shapes(skin, {"joy": deltas(reference, "skin")}, {})
-    shape_keys.remove_baked(skin)
+    baking.remove_baked(skin)
     assert names(skin) == ["Basis", shape_keys.SCANNED]
     assert shape_keys.baked_names(skin) == []

@@ -149,7 +149,7 @@ def test_a_file_plays_the_simulation_without_the_extension(bpy, chosen, referenc
 
 
 def test_a_rig_is_taken_off_again_and_spares_the_artists_keys(bpy, chosen, reference):
-    from headshop.headshop_addon import bridge, heads, response, rig_keys, shape_keys
+    from headshop.headshop_addon import baking, bridge, heads, response, rig_keys
 
     heads.create_head(reference, "Fran")
     skin = heads.find_heads()[0]
@@ -158,8 +158,9 @@ def test_a_rig_is_taken_off_again_and_spares_the_artists_keys(bpy, chosen, refer
     rig_keys.write_rig(skin, chosen)  # in place of the first
     count = len(chosen.sliders) + len(chosen.parts["skin"].driven)
     assert len(skin.data.shape_keys.key_blocks) == 2 + count
-    rig_keys.remove_rig(skin)
-    shape_keys.remove_baked(skin)
+    assert baking.is_baked(skin)
+    baking.remove_baked(skin)
+    assert not baking.is_baked(skin)
     assert [block.name for block in skin.data.shape_keys.key_blocks] == ["Basis", "sculpted"]
     assert not len(skin.data.shape_keys.animation_data.drivers) and not rig_keys.is_rigged(skin)
     bridge.ensure_shape_key(skin, ZYGOMATICUS)
