@@ -13,7 +13,8 @@ from scipy.sparse.linalg import eigsh
 from tissue_clip import FRAME, Clock
 
 from headshop.sim.tissue.dynamics import control_between
-from headshop.sim.tissue.energy import energy_gradient, find_contacts, pose_of
+from headshop.sim.tissue.energy import find_contacts, pose_of
+from headshop.sim.tissue.forces import Landscape
 
 CONTACTS = 24  # times a frame that contacts are looked for (the implicit steps do so twice)
 TRIAL = 150  # steps that a time step must survive
@@ -38,9 +39,9 @@ class Explicit:
                 pose = pose_of(self.model, control_between(before, after, (k + every) / count))
                 held = np.setdiff1d(np.arange(len(self.x)), self.free)
                 self.x[held] = pose.reference[held]
-                planes = find_contacts(self.model, pose, self.x)
-            _, gradient = energy_gradient(self.model, pose, planes, self.x)
-            self.v -= FRAME / count * (gradient / self.mass + self.model.parameters.damping_rate * self.v)
+                at = Landscape(self.model, pose, find_contacts(self.model, pose, self.x))
+            _, gradient = at(at.free(self.x))
+            self.v -= FRAME / count * (gradient.T / self.mass + self.model.parameters.damping_rate * self.v)
             self.x[self.free] += FRAME / count * self.v
             if k % 10 == 0 and not np.abs(self.v).max() < 1e6:
                 return 0

@@ -8,7 +8,8 @@ import pytest
 
 from headshop.sim.acting.pose import Pose, control
 from headshop.sim.tissue.dynamics import GAMMA, Memory, control_between, step
-from headshop.sim.tissue.energy import energy_gradient, find_contacts, pose_of
+from headshop.sim.tissue.energy import find_contacts, pose_of
+from headshop.sim.tissue.forces import energy_gradient
 from headshop.sim.tissue.model import build_model
 from headshop.sim.tissue.solver import rest_state, solve
 from headshop.sim.tissue.surroundings import STANDARD_GRAVITY, Surroundings

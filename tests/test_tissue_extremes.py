@@ -6,7 +6,9 @@ import pytest
 
 from headshop.sim.acting.pose import control
 from headshop.sim.acting.random_poses import random_pose
-from headshop.sim.tissue.energy import energy_gradient, find_contacts, pose_of
+from headshop.sim.tissue.curvature import Curvature
+from headshop.sim.tissue.energy import find_contacts, pose_of
+from headshop.sim.tissue.forces import Landscape
 from headshop.sim.tissue.solver import descend, factorised, solve
 
 SEED, POSES = 20, 8
@@ -41,18 +43,16 @@ def test_random_poses_come_to_rest_whole(reference_model, asked):
 def test_every_step_lowers_the_energy(reference_model, asked):
     one = asked[np.argmax([a.activations.sum() for a in asked])]
     pose = pose_of(reference_model, one)
-    planes = find_contacts(reference_model, pose, pose.reference)
+    at = Landscape(reference_model, pose, find_contacts(reference_model, pose, pose.reference))
     energies = []
 
-    def value(x):
-        energy, gradient = energy_gradient(reference_model, pose, planes, x)
+    def value(q):
+        energy, gradient = at(q)
         energies.append(energy)
         return energy, gradient
 
-    x, pairs, reached = pose.reference, [], []
+    q, curvature, reached = at.free(pose.reference), Curvature(), []
     for _ in range(20):
-        x, energy, _, _ = descend(
-            value, factorised(reference_model), reference_model.cache["matrix"]["free"], x, pairs, 1
-        )
+        q, energy, _, _ = descend(value, factorised(reference_model), q, curvature, 1)
         reached.append(energy)
     assert energies[0] > reached[0] and (np.diff(reached) <= 1e-9).all()

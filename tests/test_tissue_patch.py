@@ -7,7 +7,8 @@ import pytest
 from headshop.sim.acting.pose import Pose, control
 from headshop.sim.tissue import contact, planes
 from headshop.sim.tissue.dynamics import step
-from headshop.sim.tissue.energy import energy_gradient, find_contacts, pose_of
+from headshop.sim.tissue.energy import find_contacts, pose_of
+from headshop.sim.tissue.forces import energy_gradient
 from headshop.sim.tissue.model import build_model
 from headshop.sim.tissue.solver import rest_state, solve
 

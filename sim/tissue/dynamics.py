@@ -13,7 +13,9 @@ from dataclasses import dataclass, field, fields, is_dataclass, replace
 import numpy as np
 
 from .clearing import cleared
-from .energy import Pose, energy_gradient, find_contacts, load_at, pose_of
+from .curvature import Curvature
+from .energy import Pose, find_contacts, load_at, pose_of
+from .forces import Landscape
 from .planes import Planes
 from .solver import descend, factorised, solve
 from .structures import Control, Model, State
@@ -30,10 +32,10 @@ ROUNDS, TOLERANCE, LONGEST = 12, 0.1, 1 / 24
 
 @dataclass(eq=False)
 class Memory:
-    """What a step leaves to the next of the same dt: pairs of L-BFGS, pose and contacts of its second stage,
+    """What a step leaves to the next of the same dt: what was learnt of the curvature, pose and contacts of its second stage,
     and the mm of its last quasi-Newton step (of all nodes the farthest)."""
 
-    pairs: list = field(default_factory=list)
+    curvature: Curvature = field(default_factory=Curvature)
     pose: Pose | None = None
     planes: Planes | None = None
     residual: float = 0.0
@@ -114,29 +116,29 @@ def cleared_of(model: Model, control: Control, state: State) -> State:
 def _stage(model, control, pose, here, velocity, start, planes, dt, memory, rounds, tolerance):
     """(3 n, 3) mm: the nodes after an implicit Euler step of ``dt`` from ``here`` with ``velocity``. Contacts are looked for
     where no ``planes`` are given."""
-    free = model.cache["matrix"]["free"]
-    p = model.parameters
+    free, p = model.cache["matrix"]["free"], model.parameters
     if not control.around.idle:
         pose = replace(pose, load=load_at(model, control.around, start, velocity))
-    mass = (model.mass[free] / p.dynamic_scale)[:, None]
+    if planes is None:
+        at = pose.reference.copy()
+        at[free] = start[free]
+        planes = memory.planes = find_contacts(model, pose, at)
+    landscape = Landscape(model, pose, planes)
+    mass = model.mass[free] / p.dynamic_scale
     heavy, drag = mass / dt**2, mass * p.damping_rate / dt
     # inertia pulls towards where the node would fly to, drag to where it is: both together to a place between
     pull = heavy + drag
-    goal = here[free] + heavy * dt / pull * velocity[free]
-    positions = pose.reference.copy()
-    positions[free] = start[free]
-    if planes is None:
-        planes = memory.planes = find_contacts(model, pose, positions)
+    goal = landscape.free(here) + heavy * dt / pull * landscape.free(velocity)
 
-    def value(x):
-        energy, gradient = energy_gradient(model, pose, planes, x)
-        off = x[free] - goal
+    def value(q):
+        energy, gradient = landscape(q)
+        off = q - goal
         inertia = pull * off
-        return energy + 0.5 * float(np.einsum("ij,ij->", inertia, off)), gradient + inertia
+        return energy + 0.5 * float(np.vdot(inertia, off)), gradient + inertia
 
-    factor = factorised(model, dt)
-    positions, _, memory.residual, _ = descend(value, factor, free, positions, memory.pairs, rounds, tolerance, _TRUST)
-    return positions
+    q = landscape.free(start)
+    q, _, memory.residual, _ = descend(value, factorised(model, dt), q, memory.curvature, rounds, tolerance, _TRUST)
+    return landscape.positions(q)
 
 
 def _posed(model, control, lid_goal=None):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""All forces of Lee, Terzopoulos and Waters 1995, 3.8 as the gradient of one energy of the free nodes.
+"""All forces of Lee, Terzopoulos and Waters 1995, 3.8 as the gradient of one energy of the free nodes (`forces`).
 
 springs g (3.3) + volume q (3.6) + nodal restoration h, with the bending of the skin sheet + muscles f (3.4, 3.5) +
 lids + contact s (3.7). The restoration pulls to the *posed rest*: where the node would be if the tissue only followed
@@ -13,18 +13,15 @@ from scipy import sparse
 
 from ..mesh import vertex_normals
 from . import contact
-from .axes import per_axis
 from .drawn_contact import drawn_contacts, on_the_ball
 from .jaw import jaw_transform
 from .lid_meeting import shut_share
 from .lid_targets import lid_targets
 from .muscle_field import turned_lips
-from .planes import Planes, contact_energy, joined, row_energy
-from .seal import seal_energy
-from .springs import spring_forces
+from .planes import Planes, joined
 from .structures import Control, Model
 from .surroundings import Surroundings, outer_forces
-from .volume import corner_gather, volume_forces
+from .volume import corner_gather
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,7 +151,10 @@ def bending_stiffness(model: Model) -> float:
 
 
 def system_matrix(model: Model) -> dict:
-    """The constant parts: quadratic matrix Q (2 n), solver matrix A over the free nodes, helpers."""
+    """The constant parts over the m free nodes: quadratic matrix Q, solver matrix A, helpers.
+
+    free : (m,) nodes; row : (3 n,) the place of each node among them, m for those that are not
+    """
     layers, springs, p = model.layers, model.springs, model.parameters
     n = model.count
     laplacian = model.bending
@@ -167,10 +167,13 @@ def system_matrix(model: Model) -> dict:
     stretch = springs.gather @ sparse.diags(springs.stiffness) @ springs.difference
     full = quadratic + stretch[: 2 * n, : 2 * n] + sparse.diags(lid) + _volume_matrix(model)
     free = np.flatnonzero(layers.free)
+    row = np.full(3 * n, len(free))
+    row[free] = np.arange(len(free))
     return {
-        "quadratic": quadratic[free].tocsr(),
+        "quadratic": quadratic[free][:, free].tocsr(),
         "system": full[free][:, free].tocsc(),
         "free": free,
+        "row": row,
         # forces of springs, then of prism corners, onto the free nodes
         "gather": sparse.hstack([springs.gather[free], corner_gather(model.prisms, 3 * n)[free]], format="csr"),
     }
@@ -196,57 +199,6 @@ def _volume_matrix(model: Model):
     off = sparse.csr_matrix((weight, (first, second)), (2 * n, 2 * n))
     off = off + off.T
     return sparse.diags(np.asarray(off.sum(axis=1)).ravel()) - off
-
-
-def energy_gradient(model: Model, pose: Pose, planes: Planes, positions) -> tuple[float, np.ndarray]:
-    """Energy and its gradient over the free nodes (m, 3); ``positions`` (3 n, 3)."""
-    fixed = model.cache["matrix"]
-    n = model.count
-    free = fixed["free"]
-    x = np.ascontiguousarray(positions.T)
-    energy, force = spring_forces(model.springs, x)
-    p = model.parameters
-    e, press = volume_forces(x, model.prisms, model.prism_volume, p.volume, p.crushed, p.hardening)
-    energy += e
-    gradient = per_axis(fixed["gather"], np.concatenate([force, press], axis=1))
-    e, other = contact_energy(planes, positions, model.parameters.contact * model.parameters.epidermis)
-    energy += e
-    other = other.T
-    if planes.rows is not None:
-        e, g = row_energy(planes, positions, model.parameters.contact * model.parameters.epidermis)
-        energy += e
-        other[:, : len(g)] += g.T
-    # muscles: force push (1 - progress / reach), spent at reach; contraction is progress along the fibre's direction
-    if len(pose.node):
-        progress = np.einsum("ij,ij->i", positions[pose.node] - pose.reference[pose.node], pose.pull)
-        left = np.maximum(1 - progress / pose.reach, 0)
-        energy -= 0.5 * float((pose.push * pose.reach) @ (1 - left**2))
-        _add(other, pose.node, (-pose.push * left)[:, None] * pose.pull)
-    if pose.seal:
-        e, pulled = seal_energy(model.seal, pose.seal * model.parameters.seal, positions)
-        energy += e
-        _add(other, model.seal.lower, pulled)
-        _add(other, model.seal.upper, -pulled)
-    if len(pose.lid_node):
-        off = positions[pose.lid_node] - pose.lid_goal
-        pulled = pose.lid_stiffness[:, None] * off
-        energy += 0.5 * float(np.einsum("ij,ij->", pulled, off))
-        _add(other, pose.lid_node, pulled)
-    moved = x[:, : 2 * n] - pose.reference[: 2 * n].T
-    if pose.load is not None:
-        energy -= float(np.einsum("ij,ij->", pose.load, moved))
-        other[:, : 2 * n] -= pose.load
-    restoring = per_axis(fixed["quadratic"], moved)
-    energy += 0.5 * float(np.einsum("ij,ij->", restoring, moved.take(free, axis=1, mode="clip")))
-    gradient += restoring
-    gradient += other.take(free, axis=1, mode="clip")
-    return energy, gradient.T
-
-
-def _add(total, node, values):
-    """Add values (k, 3) at nodes (k,) to ``total`` (3, n)."""
-    for axis in range(3):
-        total[axis] += np.bincount(node, values[:, axis], minlength=total.shape[1])
 
 
 def find_contacts(model: Model, pose: Pose, positions) -> Planes:

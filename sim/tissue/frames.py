@@ -9,8 +9,10 @@ change of the control.
 import numpy as np
 
 from .clearing import cleared, way_out
+from .curvature import Curvature
 from .drawn_contact import CLEAR
-from .energy import Pose, energy_gradient, find_contacts, pose_of
+from .energy import Pose, find_contacts, pose_of
+from .forces import Landscape
 from .lid_meeting import met
 from .solver import descend, factorised, minimise, rest_state
 from .structures import Control, Model, State
@@ -40,7 +42,7 @@ class Frames:
         self.model = model
         self.state = rest_state(model)
         self.residual, self.iterations, self.converged = 0.0, 0, True
-        self._pairs = []
+        self._curvature = Curvature()
         self._looks = self._lid_goal = None
         self._at = self._goal = self._asked = None  # where the nodes were, were expected, and the control as mm
         self._off = self._change = None  # by how much they lay elsewhere, and the last change of the control
@@ -66,24 +68,23 @@ class Frames:
 
     def _descended(self, pose: Pose, start, steps, tolerance):
         """Positions (3 n, 3) mm, the mm of the last step, the steps, and the contacts, found once for a few steps."""
-        model = self.model
-        at = factorised(model), model.cache["matrix"]["free"], start
+        model, factor = self.model, factorised(self.model)
         if steps > STEPS:
             positions, _, residual, done, planes = minimise(
-                lambda x, planes: energy_gradient(model, pose, planes, x),
+                lambda planes: Landscape(model, pose, planes),
                 lambda x: find_contacts(model, pose, x),
-                *at,
+                factor,
+                start,
                 steps,
                 tolerance,
-                self._pairs,
+                self._curvature,
                 _TRUST,
             )
             return positions, residual, done, planes
         planes = find_contacts(model, pose, start)
-        positions, _, residual, done = descend(
-            lambda x: energy_gradient(model, pose, planes, x), *at, self._pairs, steps, tolerance, _TRUST
-        )
-        return positions, residual, done, planes
+        at = Landscape(model, pose, planes)
+        q, _, residual, done = descend(at, factor, at.free(start), self._curvature, steps, tolerance, _TRUST)
+        return at.positions(q), residual, done, planes
 
     def cleared(self) -> State:
         """The last frame with the drawn skin clear of eyeballs, teeth and the other lip whatever contact left, as `solve`

@@ -2,6 +2,7 @@
 """Contacts as points against planes: their energy, and projection out of what is left."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,11 @@ class Planes:
     partner: np.ndarray
     rows: Any = None
     row_level: np.ndarray | None = None
+
+    @cached_property
+    def pushed(self):
+        """``rows``, transposed: what a push on each point is on its nodes."""
+        return self.rows.T
 
 
 def empty_planes() -> Planes:
@@ -49,7 +55,7 @@ def row_depths(planes: Planes, positions) -> np.ndarray:
     """(r,) mm of penetration of the points between nodes, 0 where apart."""
     if planes.rows is None:
         return np.zeros(0)
-    return np.maximum(planes.row_level - planes.rows @ positions.ravel()[: planes.rows.shape[1]], 0)
+    return np.maximum(planes.row_level - planes.rows @ positions[: planes.rows.shape[1] // 3].ravel(), 0)
 
 
 def depths(planes: Planes, positions) -> np.ndarray:
@@ -61,27 +67,28 @@ def depths(planes: Planes, positions) -> np.ndarray:
     return np.maximum(planes.level - here, 0)
 
 
-def contact_energy(planes: Planes, positions, stiffness: float) -> tuple[float, np.ndarray]:
-    """Energy ½ k Σ depth² and its gradient over all nodes."""
+def contact_pushes(planes: Planes, positions, stiffness: float):
+    """Energy ½ k Σ depth², the nodes (k,) that touch and its gradient there (k, 3); a node may come more than once."""
     depth = depths(planes, positions)
-    gradient = np.zeros(positions.shape[::-1])
     hit = np.flatnonzero(depth > 0)
-    if not len(hit):
-        return 0.0, gradient.T
     push = -stiffness * depth[hit, None] * planes.normal[hit]
     pair = planes.partner[hit]
     both = pair >= 0
     node = np.concatenate([planes.node[hit], pair[both]])
-    push = np.concatenate([push, -push[both]])
-    for axis in range(3):
-        gradient[axis] = np.bincount(node, push[:, axis], minlength=len(positions))
-    return 0.5 * stiffness * float(depth @ depth), gradient.T
+    return 0.5 * stiffness * float(depth @ depth), node, np.concatenate([push, -push[both]])
+
+
+def contact_energy(planes: Planes, positions, stiffness: float) -> tuple[float, np.ndarray]:
+    """Energy ½ k Σ depth² and its gradient over all nodes."""
+    energy, node, push = contact_pushes(planes, positions, stiffness)
+    gradient = [np.bincount(node, push[:, axis], minlength=len(positions)) for axis in range(3)]
+    return energy, np.stack(gradient, axis=1)
 
 
 def row_energy(planes: Planes, positions, stiffness: float) -> tuple[float, np.ndarray]:
     """Energy ½ k Σ depth² of the points between nodes, and its gradient over the first m nodes (m, 3)."""
     depth = row_depths(planes, positions)
-    return 0.5 * stiffness * float(depth @ depth), (planes.rows.T @ (-stiffness * depth)).reshape(-1, 3)
+    return 0.5 * stiffness * float(depth @ depth), (planes.pushed @ (-stiffness * depth)).reshape(-1, 3)
 
 
 def project(planes: Planes, positions, rounds: int = 2) -> np.ndarray:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Rest positions of the tissue; `dynamics` moves it in time.
 
-`solve` minimises the energy: quasi-Newton steps (L-BFGS, Nocedal and Wright 2006, algorithm 7.4) on the prefactored
-matrix of the springs at rest (as in projective dynamics, Liu et al. 2017), with a guarded line search.
+`solve` minimises the energy: quasi-Newton steps (L-BFGS, `curvature`) on the prefactored matrix of the springs at rest (as
+in projective dynamics, Liu et al. 2017), with a guarded line search.
 """
 
 import numpy as np
@@ -10,11 +10,12 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from .clearing import cleared
+from .curvature import Curvature
 from .diagnostics import diagnose
-from .energy import energy_gradient, find_contacts, pose_of
+from .energy import find_contacts, pose_of
+from .forces import Landscape
 from .structures import Control, Model, Solution, State
 
-MEMORY = 10
 #: Steps after which contacts are looked for again: ever more seldom, so that the last planes are solved to the end.
 _REFRESH = frozenset((4, 8, 13, 19, 27, 38, 53, 75, 105, 150))
 
@@ -39,12 +40,10 @@ def solve(
         start = pose.reference.copy()
         at = np.flatnonzero(model.layers.free[pose.lid_node])
         start[pose.lid_node[at]] = pose.lid_goal[at]
-    factor = factorised(model)
     positions, energy, residual, iterations, planes = minimise(
-        lambda x, planes: energy_gradient(model, pose, planes, x),
+        lambda planes: Landscape(model, pose, planes),
         lambda x: find_contacts(model, pose, x),
-        factor,
-        model.cache["matrix"]["free"],
+        factorised(model),
         start,
         max_iterations,
         tolerance,
@@ -114,18 +113,17 @@ def factorised(model: Model, dt: float | None = None):
     return kept[dt]
 
 
-def minimise(value, contacts, factor, free, positions, max_iterations, tolerance, pairs=None, trust=0.0):
+def minimise(value, contacts, factor, positions, max_iterations, tolerance, curvature=None, trust=0.0):
     """Quasi-Newton descent; returns positions, energy, residual (mm), iterations and the last contact planes.
 
-    pairs, trust : as in `descend`
+    value : contact planes -> `Landscape`; contacts : positions -> planes; curvature, trust : as in `descend`
     """
-    pairs = [] if pairs is None else pairs
+    curvature = Curvature() if curvature is None else curvature
     residual, done, planes, energy = np.inf, 0, contacts(positions), 0.0
     for until in (*sorted(k for k in _REFRESH if k < max_iterations), max_iterations):
-        at = planes
-        positions, energy, residual, steps = descend(
-            lambda x, at=at: value(x, at), factor, free, positions, pairs, until - done, tolerance, trust
-        )
+        at = value(planes)
+        q, energy, residual, steps = descend(at, factor, at.free(positions), curvature, until - done, tolerance, trust)
+        positions = at.positions(q)
         done += steps
         if residual <= tolerance or done < until or until == max_iterations:
             break
@@ -133,32 +131,30 @@ def minimise(value, contacts, factor, free, positions, max_iterations, tolerance
     return positions, energy, residual, done, planes
 
 
-def descend(value, factor, free, positions, pairs, steps, tolerance=0.0, trust=0.0):
-    """At most ``steps`` quasi-Newton steps; returns positions, energy, residual (mm) and the number of steps.
+def descend(value, factor, q, curvature, steps, tolerance=0.0, trust=0.0):
+    """At most ``steps`` quasi-Newton steps from ``q`` (3, m) mm; returns where they end, the energy, the residual (mm) and
+    the number of steps.
 
-    value : positions (3 n, 3) -> energy and its gradient over the ``free`` nodes
-    pairs : what is known of the curvature; is added to
+    value : q -> energy and its gradient (3, m)
+    curvature : `Curvature`, what is known of it; is added to
     trust : mm; a last step no longer than this is taken without a look at the energy behind it
     """
-    energy, gradient = value(positions)
+    energy, gradient = value(q)
+    solved = factor.solve(gradient.T).T
     residual = np.inf
     for count in range(1, steps + 1):
-        direction = -_two_loop(gradient, pairs, factor)
-        slope = float(np.einsum("ij,ij->", direction, gradient))
+        direction = -curvature.applied(gradient, solved)
+        slope = float(np.vdot(direction, gradient))
         if slope >= 0:  # a stale memory: fall back to the matrix alone
-            pairs.clear()
-            direction = -factor.solve(gradient)
-            slope = float(np.einsum("ij,ij->", direction, gradient))
-        residual = float(np.sqrt((direction**2).sum(axis=1).max(initial=0.0)))
+            curvature.clear()
+            direction = -solved
+            slope = float(np.vdot(direction, gradient))
+        residual = float(np.sqrt(np.einsum("ij,ij->j", direction, direction).max(initial=0.0)))
         if residual <= tolerance or (count == steps and residual <= trust):
-            if trust:
-                positions = positions.copy()
-                positions[free] += direction
-            return positions, energy, residual, count
+            return q + direction if trust else q, energy, residual, count
         length = min(1.0, 15.0 / residual)  # no node jumps farther than this in one step
-        moved = positions.copy()
         for _ in range(12):
-            moved[free] = positions[free] + length * direction
+            moved = q + length * direction
             new_energy, new_gradient = value(moved)
             if new_energy <= energy + 1e-4 * length * slope:
                 break
@@ -166,27 +162,11 @@ def descend(value, factor, free, positions, pairs, steps, tolerance=0.0, trust=0
             curve = new_energy - energy - length * slope
             length *= float(np.clip(-0.5 * length * slope / max(curve, 1e-30), 0.1, 0.6))
         else:
-            if not pairs:
-                return positions, energy, residual, count
-            pairs.clear()
+            if not len(curvature):
+                return q, energy, residual, count
+            curvature.clear()
             continue
-        s, y = (length * direction).ravel(), (new_gradient - gradient).ravel()
-        curvature = float(s @ y)
-        if curvature > 1e-10:
-            pairs.append((s, y, curvature))
-            del pairs[:-MEMORY]
-        positions, energy, gradient = moved, new_energy, new_gradient
-    return positions, energy, residual, steps
-
-
-def _two_loop(gradient, pairs, factor):
-    q = gradient.ravel().copy()
-    kept = []
-    for s, y, curvature in reversed(pairs):
-        a = float(s @ q) / curvature
-        q -= a * y
-        kept.append(a)
-    r = factor.solve(q.reshape(gradient.shape)).ravel()
-    for (s, y, curvature), a in zip(pairs, reversed(kept), strict=True):
-        r += (a - float(y @ r) / curvature) * s
-    return r.reshape(gradient.shape)
+        new_solved = factor.solve(new_gradient.T).T
+        curvature.add(length * direction, new_gradient - gradient, new_solved - solved)
+        q, energy, gradient, solved = moved, new_energy, new_gradient, new_solved
+    return q, energy, residual, steps

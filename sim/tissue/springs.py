@@ -73,15 +73,15 @@ def assemble(nodes, first, second, kind, stiffness, stiff, limit) -> Springs:
     )
     rest = np.maximum(rest, 1e-3)
     gather = difference.T.tocsr()
-    return Springs(
-        first, second, kind, rest, stiffness, stiff, limit, np.flatnonzero(stiff > stiffness), difference, gather
-    )
+    two = np.flatnonzero(stiff > stiffness)
+    biphasic = slice(two[0], two[-1] + 1) if len(two) else slice(0)
+    return Springs(first, second, kind, rest, stiffness, stiff, limit, biphasic, difference, gather)
 
 
-def spring_forces(springs: Springs, x: np.ndarray) -> tuple[float, np.ndarray]:
+def spring_forces(springs: Springs, x: np.ndarray, out=None) -> tuple[float, np.ndarray]:
     """Energy and g of each spring (3, s), the force on its first node (3.3); ``x`` (3, k) mm, axis by axis."""
     d = per_axis(springs.difference, x)
-    length = np.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
+    length = np.sqrt(np.einsum("ij,ij->j", d, d))
     stretch = length - springs.rest
     tension = springs.stiffness * stretch
     energy = float(tension @ stretch)
@@ -89,8 +89,8 @@ def spring_forces(springs: Springs, x: np.ndarray) -> tuple[float, np.ndarray]:
     beyond = np.maximum(stretch[two] - springs.limit[two] * springs.rest[two], 0)
     extra = (springs.stiff[two] - springs.stiffness[two]) * beyond
     tension[two] += extra
-    d *= tension / np.maximum(length, 1e-9)
-    return 0.5 * (energy + float(extra @ beyond)), d
+    tension /= np.maximum(length, 1e-9, out=length)
+    return 0.5 * (energy + float(extra @ beyond)), np.multiply(d, tension, out=d if out is None else out)
 
 
 def spring_energy(springs: Springs, positions: np.ndarray) -> tuple[float, np.ndarray]:

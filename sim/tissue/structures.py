@@ -41,8 +41,8 @@ class Layers:
 
 @dataclass(frozen=True, eq=False)
 class Springs:
-    """The springs of 3.3. kind is an index into `springs.KINDS`; ``stiff`` and ``limit``: second phase (biphasic); those
-    that have one are the rows ``biphasic``."""
+    """The springs of 3.3. kind is an index into `springs.KINDS`; ``stiff`` and ``limit``: second phase (biphasic), which only
+    some of the rows ``biphasic`` have; the limit of others is infinite."""
 
     first: np.ndarray
     second: np.ndarray
@@ -51,7 +51,7 @@ class Springs:
     stiffness: np.ndarray
     stiff: np.ndarray
     limit: np.ndarray
-    biphasic: np.ndarray
+    biphasic: slice
     difference: Any  # sparse (s, 3 n): node positions -> spring vectors
     gather: Any  # its transpose in row form
 

@@ -72,7 +72,7 @@ def corner_gather(prisms: np.ndarray, count: int) -> sparse.csr_matrix:
     return sparse.csr_matrix((np.ones(k), (prisms.T.ravel(), np.arange(k))), (count, k))
 
 
-def volume_forces(x, prisms, rest_volume, k1, crushed=0.0, hardening=0.0) -> tuple[float, np.ndarray]:
+def volume_forces(x, prisms, rest_volume, k1, crushed=0.0, hardening=0.0, out=None) -> tuple[float, np.ndarray]:
     """Energy ½ k1 Σ (V - V_rest)² / V_rest and what it does to each corner (3, 6 t), corner-major; ``x`` (3, k) mm.
 
     A prism with less than the share ``crushed`` of its volume resists ``hardening`` times more: 3.6 alone has no way to keep
@@ -85,8 +85,9 @@ def volume_forces(x, prisms, rest_volume, k1, crushed=0.0, hardening=0.0) -> tup
     resistance = hardening * k1 * missing / rest_volume
     energy = 0.5 * float(pressure @ volume + resistance @ missing)
     pressure -= resistance
-    grad *= pressure
-    return energy, grad.reshape(3, -1)
+    out = np.empty((3, prisms.size)) if out is None else out
+    np.multiply(grad, pressure, out=out.reshape(grad.shape))
+    return energy, out
 
 
 def volume_energy(positions, prisms, rest_volume, k1, gather) -> tuple[float, np.ndarray]:

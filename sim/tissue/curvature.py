@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the steps of a descent have taught of the energy's curvature (L-BFGS), in its compact form.
+
+The two loops of Nocedal and Wright 2006, algorithm 7.4, pass over every pair by itself; the same inverse as one product of
+tall matrices (Byrd, Nocedal and Schnabel 1994, Math. Program. 63, theorem 2.2) passes over the memory four times in all.
+"""
+
+import numpy as np
+
+
+class Curvature:
+    """The last steps s, changes y of the gradient along them, and A^-1 y, with A the matrix that a descent steps by."""
+
+    def __init__(self, memory: int = 10):
+        self._memory = memory
+        self.clear()
+
+    def __len__(self):
+        return len(self._order)
+
+    def clear(self):
+        """Forget all."""
+        self._order = []  # rows of the tables, from the oldest to the newest
+        self._next = 0
+
+    def add(self, step, change, solved):
+        """Remember a ``step``, the ``change`` of the gradient and A^-1 times that, all of one shape; if it curves upwards."""
+        if not float(np.vdot(step, change)) > 1e-10:
+            return
+        if not self._order:
+            size = self._memory
+            self._steps, self._changes, self._solved = np.zeros((3, size, step.size))
+            self._across, self._inner = np.zeros((2, size, size))
+        at = self._next
+        if len(self._order) == self._memory:
+            self._order.remove(at)
+        self._order.append(at)
+        self._next = (at + 1) % self._memory
+        self._steps[at], self._changes[at], self._solved[at] = step.ravel(), change.ravel(), solved.ravel()
+        self._across[:, at] = self._steps @ self._changes[at]
+        self._across[at] = self._changes @ self._steps[at]
+        self._inner[at] = self._inner[:, at] = self._changes @ self._solved[at]
+        k = len(self._order)
+        rows = np.array(self._order)
+        order = np.ix_(rows, rows)
+        upper = np.triu(self._across[order])
+        self._root = np.zeros((k, k))
+        self._root[order] = np.linalg.inv(upper)
+        self._middle = self._inner[:k, :k] + np.diag(np.diag(self._across)[:k])
+
+    def applied(self, gradient, solved):
+        """The inverse curvature times ``gradient``, from A^-1 times that, ``solved``; both of one shape."""
+        k = len(self._order)
+        if not k:
+            return solved
+        steps, tail = self._steps[:k], self._solved[:k]
+        flat = gradient.ravel()
+        along = self._root @ (steps @ flat)
+        back = self._root.T @ (self._middle @ along - tail @ flat)
+        return solved + (back @ steps - along @ tail).reshape(solved.shape)
