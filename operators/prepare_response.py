@@ -3,7 +3,7 @@
 
 import bpy
 
-from ..headshop_addon import active, live, polls
+from ..headshop_addon import active, following, live, polls
 from ..headshop_addon.jobs import Job
 
 
@@ -39,7 +39,7 @@ class HEADSHOP_OT_prepare_response(Job, bpy.types.Operator):
     def finish(self, context, result):
         """Let the sliders use it."""
         skin = active.skin(context)
-        live.forget(skin)
+        following.forget(skin)
         skin.headshop.model = "INSTANT"
         live.follow(skin)
         _, accuracy = result

@@ -25,12 +25,12 @@ def skin(addon, reference, reference_model, monkeypatch):
 
 def live_delta(skin) -> np.ndarray:
     """(n, 3) mm that the live pose moves the skin."""
-    from headshop.headshop_addon import bridge, live
+    from headshop.headshop_addon import bridge, following
 
     keys = skin.data.shape_keys
-    if keys is None or live.KEY not in keys.key_blocks:
+    if keys is None or following.KEY not in keys.key_blocks:
         return np.zeros((len(skin.data.vertices), 3))
-    return bridge.read_positions(skin, live.KEY) - bridge.read_positions(skin)
+    return bridge.read_positions(skin, following.KEY) - bridge.read_positions(skin)
 
 
 def peak(skin) -> float:
@@ -105,24 +105,24 @@ def test_the_face_follows_keyed_sliders_along_the_time_line(skin, addon):
 
 
 def test_setting_many_sliders_solves_once(skin, addon, monkeypatch):
-    from headshop.headshop_addon import live
+    from headshop.headshop_addon import following
 
     calls = []
-    solve = live._solve
-    monkeypatch.setattr(live, "_solve", lambda *arguments: calls.append(1) or solve(*arguments))
+    pose = following.pose
+    monkeypatch.setattr(following, "pose", lambda *arguments: calls.append(1) or pose(*arguments))
     addon.ops.headshop.set_expression(expression="joy", amount=0.4)
     assert len(calls) == 1
 
 
 def test_a_changed_rest_shape_is_simulated_anew(skin):
     """The cache may never speak of a head that is no longer there."""
-    from headshop.headshop_addon import bridge, live
+    from headshop.headshop_addon import bridge, following
 
     skin.headshop.muscles.corrugator_l = 1.0
-    before = live._following[skin.session_uid].model
+    before = following.kept[skin.session_uid].model
     bridge.write_positions(skin, bridge.read_positions(skin) * 1.1)
     skin.headshop.muscles.corrugator_l = 0.9
-    assert live._following[skin.session_uid].model is not before
+    assert following.kept[skin.session_uid].model is not before
 
 
 def test_undo_takes_the_face_back_with_the_slider(skin, addon):
@@ -173,13 +173,13 @@ def test_other_objects_have_sliders_that_do_nothing(addon):
 
 
 def test_the_other_model_takes_over_and_hands_back(skin):
-    from headshop.headshop_addon import live
+    from headshop.headshop_addon import following
 
     skin.headshop.muscles.zygomaticus_major_l = 0.8
     simulated = live_delta(skin)
     skin.headshop.model = "DIRECT"
     direct = live_delta(skin)
-    assert live._following[skin.session_uid].acting.name == "waters" and live._following[skin.session_uid].settled
+    assert following.kept[skin.session_uid].acting.name == "waters" and following.kept[skin.session_uid].settled
     assert 5 < np.linalg.norm(direct, axis=1).max() < 12 and np.abs(direct - simulated).max() > 1
     skin.headshop.muscles.zygomaticus_major_l = 0.0
     assert peak(skin) == 0.0

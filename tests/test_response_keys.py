@@ -179,7 +179,7 @@ def _kept(skin, learnt):
 
 def test_sliders_play_what_was_learnt(addon, learnt, reference):
     """Instant: the face is the rig's; where the head was reshaped since, the simulation moves it as before."""
-    from headshop.headshop_addon import bridge, heads, live, response
+    from headshop.headshop_addon import bridge, following, heads, live, response
 
     heads.create_head(reference, "Fran")
     skin = heads.find_heads()[0]
@@ -189,12 +189,12 @@ def test_sliders_play_what_was_learnt(addon, learnt, reference):
     live.set_sliders(skin, {ZYGOMATICUS: 0.8, "jaw_open": 0.3})
     acting = actor_of(learnt, reference)
     asked = control(acting, Pose({ZYGOMATICUS: 0.8}, jaw_open=0.3))
-    np.testing.assert_allclose(bridge.read_positions(skin, live.KEY), learnt.skin(asked), atol=0.01)
+    np.testing.assert_allclose(bridge.read_positions(skin, following.KEY), learnt.skin(asked), atol=0.01)
     mandible = heads.parts_of(skin)["mandible"]
-    assert np.abs(bridge.read_positions(mandible, live.KEY) - reference.parts["mandible"].vertices).max() > 5
+    assert np.abs(bridge.read_positions(mandible, following.KEY) - reference.parts["mandible"].vertices).max() > 5
     live.set_sliders(skin, {})
-    np.testing.assert_allclose(bridge.read_positions(skin, live.KEY), reference.skin.vertices, atol=1e-4)
-    assert live._following[skin.session_uid].acting is live.INSTANT
+    np.testing.assert_allclose(bridge.read_positions(skin, following.KEY), reference.skin.vertices, atol=1e-4)
+    assert following.kept[skin.session_uid].acting is following.INSTANT
     moved = reference.skin.vertices.copy()
     moved[:5] += 1.0
     bridge.write_positions(skin, moved)
@@ -202,7 +202,7 @@ def test_sliders_play_what_was_learnt(addon, learnt, reference):
     with pytest.raises(InputError, match="reshaped"):
         response.stored(skin)
     live.set_sliders(skin, {ZYGOMATICUS: 0.5})
-    assert live._following[skin.session_uid].acting is not live.INSTANT
+    assert following.kept[skin.session_uid].acting is not following.INSTANT
 
 
 def test_what_was_learnt_is_appended_with_the_head(bpy, learnt, reference, tmp_path):
