@@ -8,6 +8,7 @@ from pathlib import Path
 
 from ..sim.errors import InputError
 from ..sim.progress import finish
+from .headless import open_head, save, set_up_view, start_blender, wake_cycles
 from .outputs import Outputs
 from .progress_bar import progress_bar
 
@@ -17,7 +18,7 @@ _BLEND, _PICTURES, _ENGINES, _LANDMARKS = (".blend",), (".png", ".mp4"), (".glb"
 
 def version() -> None:
     """Print the versions of what a head is made with."""
-    _start_blender()
+    start_blender()
     from .provenance import versions
 
     print("  ".join(f"{name} {number}" for name, number in versions().items()))
@@ -33,7 +34,7 @@ def build(options) -> None:
     with Outputs() as outputs:
         blend = outputs.file(options.output)
         plain = _plain_folder(outputs, options)
-        _start_blender()
+        start_blender()
         from . import pipeline
 
         name = options.name or Path(options.scan).stem
@@ -43,8 +44,8 @@ def build(options) -> None:
         else:
             work = pipeline.build_file(options.scan, landmarks, name, options.units, options.up, **wanted)
         skin, report = _run(work, options)
-        _set_stage(skin)
-        _save(blend)
+        set_up_view(skin)
+        save(blend)
         _write_plain(skin, plain, outputs)
     if not options.quiet:
         print(f"{options.output}: {report['fit']['sentence']}")
@@ -58,7 +59,7 @@ def landmarks(options) -> None:
     _require_kind(options.output, _LANDMARKS)
     with Outputs() as outputs:
         file = outputs.file(options.output)
-        _start_blender()
+        start_blender()
         from . import pipeline
 
         scan, found = _run(pipeline.load_scan_alone(options.scan, options.units, options.up), options)
@@ -91,11 +92,11 @@ def bake(options) -> None:
     with Outputs() as outputs:
         blend = outputs.file(output)
         plain = _plain_folder(outputs, options)
-        skin = _open(options)
+        skin = open_head(options.head, options.name)
         from . import baking
 
         report = _run(baking.bake(skin, options.poses, performance, options.model, options.dynamic), options)
-        _save(blend)
+        save(blend)
         _write_plain(skin, plain, outputs)
     if not options.quiet:
         print(f"{output}: {baking.summary(report)}")
@@ -110,7 +111,7 @@ def render(options) -> None:
     kind = _require_kind(options.output, _PICTURES[:1] if still else _PICTURES)
     with Outputs() as outputs:
         picture = outputs.file(options.output)
-        skin = _open(options)
+        skin = open_head(options.head, options.name)
         wanted = {}
         if options.fit:
             from .heat_sheet import render_fit as render_it
@@ -123,7 +124,7 @@ def render(options) -> None:
         else:
             from .movie import render_movie as render_it
         if not options.fit:
-            _wake_cycles()
+            wake_cycles()
         _run(render_it(skin, picture, **wanted), options)
     if not options.quiet:
         print(options.output)
@@ -135,7 +136,7 @@ def export(options) -> None:
     _require_kind(options.output, _ENGINES)
     with Outputs() as outputs:
         copy = outputs.file(options.output)
-        skin = _open(options)
+        skin = open_head(options.head, options.name)
         from .export import export_head
 
         names = export_head(skin, copy)
@@ -174,85 +175,9 @@ def _require_kind(path, kinds) -> str:
     return kind
 
 
-def _start_blender() -> None:
-    """Make Blender's module ready with an empty scene.
-
-    Raises
-    ------
-    InputError : it is not installed.
-    """
-    from .quiet import quiet
-
-    try:
-        with quiet():
-            import bpy
-    except ModuleNotFoundError as error:
-        raise InputError(
-            "Blender's module is not installed here: run pip install bpy==5.0.1 (Python 3.11) or bpy==5.2.3 (Python "
-            "3.13), or use blender --command headshop."
-        ) from error
-    with quiet():
-        bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-
-
-def _open(options):
-    """Open the .blend without running its scripts; returns the skin of its head."""
-    _start_blender()
-    import bpy
-
-    from . import heads
-    from .quiet import quiet
-
-    path = Path(options.head).resolve()
-    with quiet():
-        try:
-            bpy.ops.wm.open_mainfile(filepath=str(path), use_scripts=False)
-        except RuntimeError as error:
-            raise InputError(
-                f"{options.head} is not a .blend file that can be opened: build the head again."
-            ) from error
-    return heads.only_head(name=options.name)
-
-
-def _save(path: Path) -> None:
-    import bpy
-
-    from .quiet import quiet
-
-    with quiet():
-        try:
-            bpy.ops.wm.save_as_mainfile(filepath=str(path.resolve()), check_existing=False, compress=True, copy=True)
-        except RuntimeError as error:
-            raise InputError(f"{path.name} cannot be written ({error}): is the disk full?") from error
-
-
 def _run(work, options):
     with progress_bar(not options.quiet) as show:
         return finish(work, show)
-
-
-def _wake_cycles() -> None:
-    """Let the renderer look for graphics cards now, while what it says about them is held back."""
-    import bpy
-
-    from .quiet import quiet
-
-    settings = getattr(bpy.context.scene, "cycles", None)
-    with quiet():
-        getattr(settings, "denoiser", None)
-
-
-def _set_stage(skin) -> None:
-    """Lights, a camera and a viewport on the head, so that the file opens as a picture."""
-    import bpy
-
-    from .opening_view import look_at
-    from .quiet import quiet
-    from .stage import set_stage
-
-    with quiet():
-        set_stage(bpy.context.scene, skin)
-    look_at(skin)
 
 
 def _plain_folder(outputs: Outputs, options):

@@ -51,9 +51,9 @@ def run(folder: Path, seed: int | None = None) -> None:
         scan_file, landmark_file, _ = write_sample(sample, folder / "sample")
         say(f"{scan_file}: {len(sample.scan.faces):,} triangles of a person who does not exist")
 
-    from .commands import _start_blender
+    from .headless import start_blender
 
-    _start_blender()
+    start_blender()
     from ..sim.adapt.landmarks import read_landmarks
     from . import baking, pipeline
     from .contact_sheet import render_sheet
@@ -99,7 +99,7 @@ def _scene():
 
 
 def _save(path: Path) -> None:
-    from .commands import _save as save
+    from .headless import save
     from .outputs import Outputs
 
     with Outputs() as outputs:
