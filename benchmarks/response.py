@@ -17,7 +17,7 @@ import numpy as np
 from headshop.sim.acting.pose import control
 from headshop.sim.anatomy.storage import load_head
 from headshop.sim.progress import finish
-from headshop.sim.response import accuracy, fit, sampling, storage
+from headshop.sim.response import accuracy, fit, mirror, sampling, storage
 from headshop.sim.tissue.model import build_model
 from headshop.sim.tissue.solver import solve
 
@@ -63,7 +63,7 @@ def main():
     samples = finish(sampling.sampled(model, poses))
     sampled, cpu = time.perf_counter() - begin, time.process_time() - used
     used = time.process_time()
-    rig = finish(fit.fit_rig(model, samples, len(sampling.single_poses(names))))
+    rig = finish(fit.fit_rig(model, samples, len(sampling.single_poses(names)), mirror.opposite_vertices(head)))
     fitted = time.process_time() - used
     size = len(storage.to_bytes(rig)) / 1e6
     print(f"{len(poses)} samples in {sampled:.0f} s ({cpu:.0f} s CPU), fitted in {fitted:.1f} s CPU, {size:.1f} MB")

@@ -15,9 +15,9 @@ from ..sim.acting.pose import CONTROLS
 from ..sim.progress import Progress, Work, portion
 from ..sim.response.actor import actor_of
 from ..sim.response.keys import Keys, chosen_keys
+from ..sim.response.mixtures import SIGNED
 from ..sim.response.playing import played_parts, played_poses
 from ..sim.response.quantities import letters, sliders
-from ..sim.response.sampling import SIGNED
 from . import bridge, heads, response, shape_keys
 
 QUANTITIES = "headshop_rig"  # on the skin's object: names of the custom properties that belong to the rig

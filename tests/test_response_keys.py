@@ -11,7 +11,7 @@ import pytest
 from headshop.sim.acting.pose import Pose, control, pose_from
 from headshop.sim.errors import InputError
 from headshop.sim.progress import finish
-from headshop.sim.response import fit, formula, keys, playing, quantities, sampling, storage
+from headshop.sim.response import fit, formula, keys, mixtures, playing, quantities, sampling, storage
 from headshop.sim.response.actor import actor_of
 from headshop.sim.response.formula import of
 from headshop.sim.response.jaw_frame import JawFrame
@@ -96,7 +96,7 @@ def test_quantities_say_what_a_control_says(learnt, reference_model):
     rng = np.random.default_rng(3)
     names = quantities.sliders(learnt)
     for _ in range(5):
-        values = {name: rng.uniform(-1 if name in sampling.SIGNED else 0, 1) for name in names}
+        values = {name: rng.uniform(-1 if name in mixtures.SIGNED else 0, 1) for name in names}
         known = quantities.values_of(quantities.quantities(learnt), {k: np.array([v]) for k, v in values.items()})
         asked = control(reference_model, pose_from(values))
         np.testing.assert_allclose([known[k][0] for k in ("opening", "forward", "aside")], asked.jaw, atol=1e-3)

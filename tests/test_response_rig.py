@@ -7,7 +7,7 @@ import pytest
 from headshop.sim.acting.pose import Pose, control
 from headshop.sim.errors import InputError
 from headshop.sim.progress import finish
-from headshop.sim.response import actor, fit, sampling, storage
+from headshop.sim.response import actor, fit, mirror, mixtures, sampling, storage
 from headshop.sim.response.accuracy import errors, summary
 from headshop.sim.response.inputs import input_names, inputs_of
 from headshop.sim.response.jaw_frame import JawFrame
@@ -108,15 +108,47 @@ def test_a_rig_is_kept_as_bytes(patch):
             storage.from_bytes(damaged, head)
 
 
+def test_one_side_is_learnt_from_the_other(reference, reference_model):
+    """The right muscle was simulated at its end alone; how it gets there is seen in the mirror."""
+    left, right = MUSCLE, MUSCLE[:-1] + "r"
+    poses = [Pose({left: 1.0}), Pose({right: 1.0}), *(Pose({left: value}) for value in (0.2, 0.4, 0.7))]
+    samples = finish(sampling.sampled(reference_model, poses))
+    opposite = mirror.opposite_vertices(reference)
+    asked = [control(reference_model, Pose({side: 0.4})) for side in (left, right)]
+    images, alone = (finish(fit.fit_rig(reference_model, samples, 2, each)) for each in (opposite, None))
+    known = images.skin(asked[0])
+    off = [np.linalg.norm(rig.skin(asked[1]) - known[opposite] * (-1, 1, 1), axis=1).max() for rig in (images, alone)]
+    assert off[0] < 0.15 < 0.5 < off[1], off
+
+
+def test_images_count_for_as_much_as_both_sides_are_alike(reference, reference_model, flat_patch):
+    names = reference_model.muscle_names
+    count = len(input_names(names))
+    rng = np.random.default_rng(2)
+    inputs = rng.uniform(-1, 1, (5, count))
+    inputs[1] = mirror.mirrored_inputs(names, inputs[:1])[0]
+    np.testing.assert_array_equal(mirror.mirrored_inputs(names, inputs[1:2]), inputs[:1])
+    opposite = mirror.opposite_vertices(reference)
+    np.testing.assert_array_equal(opposite[opposite], np.arange(len(opposite)))
+    own = rng.normal(size=(5, len(opposite), 3))
+    own[1] = own[0, opposite] * (-1, 1, 1)
+    for lopsided, alike in ((0.0, 1.0), (3.0, 0.1**0.5)):  # two that differ by noise of thrice their size
+        own[1] += lopsided * rng.normal(size=own[1].shape)
+        seen = mirror.seen_twice(names, inputs, own, opposite)
+        assert seen.real.sum() == 5 and len(seen.own) == 5 + 3 and len(seen.both) == 2
+        assert seen.alike(np.arange(len(opposite))) == pytest.approx(alike, abs=0.02)
+    assert mirror.opposite_vertices(flat_patch(13, 60.0)) is None
+
+
 def test_poses_drawn_stay_within_their_range_and_are_drawn_alike(reference_model):
     names = reference_model.muscle_names
     poses = sampling.drawn_poses(names, 40, np.random.default_rng(5))
     assert poses == sampling.drawn_poses(names, 40, np.random.default_rng(5))
-    values = np.array([[pose.values().get(name, 0.0) for name in sampling.channels(names)] for pose in poses])
-    signed = np.isin(sampling.channels(names), sampling.SIGNED)
+    values = np.array([[pose.values().get(name, 0.0) for name in mixtures.channels(names)] for pose in poses])
+    signed = np.isin(mixtures.channels(names), mixtures.SIGNED)
     assert values.max() == 1 and values[:, signed].min() == -1 and values[:, ~signed].min() == 0
     seen = values[len(sampling.single_poses(names)) :]
     assert (np.abs(seen).max(axis=1) > 0).all()
     # every channel that moves skin by itself was drawn
-    still = [name for name, used in zip(sampling.channels(names), np.abs(values).max(axis=0), strict=True) if not used]
+    still = [name for name, used in zip(mixtures.channels(names), np.abs(values).max(axis=0), strict=True) if not used]
     assert all(name.startswith(("masseter", "temporalis", "pterygoideus", "digastricus")) for name in still)

@@ -13,15 +13,20 @@ from .rig import Rig
 
 #: The simulation counts as converged with steps under this, mm, or after so many of them.
 TOLERANCE, ITERATIONS = 0.002, 300
-KINDS = ("one", "three", "all", "three_jaw", "all_jaw")
+#: Kinds of poses that are drawn at random.
+KINDS = ("one", "three", "all", "three_jaw", "all_jaw", "shapes", "between")
 
 
 def unseen_poses(muscle_names, kind: str, count: int, rng: np.random.Generator) -> list[Pose]:
-    """``count`` poses of one, three or all muscles at random, with the jaw anywhere in its range if the kind says so; or
-    the poses of a table: ``expressions``, ``arkit``."""
+    """``count`` poses of one, three or all muscles at random, with the jaw anywhere in its range if the kind says so; of two
+    to four ARKit shapes on top of each other (``shapes``), between two expressions and rest (``between``), both at any
+    strength; or all poses of a table: ``expressions``, ``arkit``."""
     tables = {"expressions": expressions.expressions, "arkit": arkit.poses}
     if kind in tables:
         return [expressions.for_head(pose, muscle_names) for pose in tables[kind]().values()]
+    if kind in ("shapes", "between"):
+        rows = unseen_poses(muscle_names, "arkit" if kind == "shapes" else "expressions", 0, rng)
+        return [_overlaid(rows, kind, rng) for _ in range(count)]
     names = [name for name in muscle_names if base_name(name) not in JAW_MUSCLES]
     many = {"one": 1, "three": 3, "all": len(names)}[kind.partition("_")[0]]
     out = []
@@ -31,6 +36,16 @@ def unseen_poses(muscle_names, kind: str, count: int, rng: np.random.Generator) 
             values |= {"jaw_open": rng.uniform(), "jaw_forward": rng.uniform(-1, 1), "jaw_side": rng.uniform(-1, 1)}
         out.append(pose_from(values))
     return out
+
+
+def _overlaid(rows, kind, rng) -> Pose:
+    chosen = rng.choice(len(rows), rng.integers(2, 5) if kind == "shapes" else 2, replace=False)
+    share = rng.uniform(size=len(chosen)) if kind == "shapes" else rng.uniform(0.2, 1) * rng.dirichlet((1, 1))
+    total: dict[str, float] = {}
+    for k, weight in zip(chosen, share, strict=True):
+        for name, value in rows[k].values().items():
+            total[name] = total.get(name, 0.0) + weight * value
+    return pose_from(total)
 
 
 def errors(rig: Rig, model: Model, poses) -> Work:

@@ -8,6 +8,7 @@ from ..progress import Progress, Work, portion
 from ..tissue.model import build_model
 from .accuracy import KINDS, measured
 from .fit import fit_rig
+from .mirror import opposite_vertices
 from .rig import Rig
 from .sampling import COUNTS, drawn_poses, sampled, single_poses
 
@@ -24,7 +25,9 @@ def build_rig(head: Head, care: str = "normal", seed: int = 0, unseen: int = 2) 
     poses = drawn_poses(names, COUNTS[care], np.random.default_rng(seed))
     border = 0.9 if unseen else 0.98
     samples = yield from portion(sampled(model, poses), 0.01, border)
-    rig: Rig = yield from portion(fit_rig(model, samples, len(single_poses(names))), border, border + 0.02)
+    rig: Rig = yield from portion(
+        fit_rig(model, samples, len(single_poses(names)), opposite_vertices(head)), border, border + 0.02
+    )
     report = {}
     if unseen:
         report = yield from portion(measured(rig, model, (*KINDS, "expressions"), unseen), border + 0.02, 1.0)

@@ -8,8 +8,8 @@ from ..progress import Progress, Work
 from ..tissue.muscle_field import JAW_MUSCLES, base_name
 from ..tissue.posing import posed_parts
 from .actor import Actor
+from .mixtures import SIGNED, mixed_pose
 from .quantities import sliders
-from .sampling import SIGNED, mixed_pose
 
 #: How far each slider is moved alone, besides 1; how many poses of a few sliders and of many.
 _WAY = (0.08, 0.25, 0.5, 0.75, -0.3, -0.65, -1.0)

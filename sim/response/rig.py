@@ -2,9 +2,9 @@
 """The response rig: the skin of a head in any pose within a millisecond, learnt from the simulation.
 
 Inputs become forces and progress of the muscles (`spending`). The skin's own motion (`jaw_frame`) is linear in the
-forces plus a smooth function of the progress: kernel ridge regression with a Matérn 5/2 kernel (Rasmussen and Williams
-2006, 4.17 and 2.25), region by region, each seeing only what moves it, in principal modes of what it does. At rest all
-terms vanish: the neutral face is exactly the scan.
+forces plus a function of how it bends: kernel ridge regression with a Matérn 3/2 kernel (Rasmussen and Williams 2006,
+4.17 and 2.25; contact makes the response no smoother than that), region by region, each seeing only what moves it, in
+principal modes of what it does. At rest all terms vanish: the neutral face is exactly the scan.
 """
 
 from dataclasses import dataclass
@@ -17,13 +17,15 @@ from .inputs import CENTRES, inputs_of
 from .jaw_frame import JawFrame
 from .spending import Spending
 
-LENGTH = 2.0  # of the kernel, in the scaled coordinates of each region
+LENGTH = 2.5  # of the kernel, in the scaled coordinates of each region
+#: What skin bends with, of a muscle: its progress, and this share of its activation in place of as much of that.
+_ASKED = 0.4
 
 
 def matern(squared: np.ndarray) -> np.ndarray:
-    """Matérn 5/2 of squared distances (any shape), 1 at 0."""
-    far = np.sqrt(5 * np.maximum(squared, 0.0)) / LENGTH
-    return (1 + far + far * far / 3) * np.exp(-far)
+    """Matérn 3/2 of squared distances (any shape), 1 at 0."""
+    far = np.sqrt(np.maximum(squared, 0.0) * (3 / LENGTH**2))
+    return (1 + far) * np.exp(-far)
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,8 +45,8 @@ class Region:
 class Rig:
     """muscle_names of the head; sphincters: which of the k muscles that pull on skin are the lips' (-1: none); g regions.
 
-    scale (g, p) weights of the progress coordinates, 0 where a region does not feel an input; samples (s, p) the progress
-    coordinates of the poses it was learnt from
+    scale (g, p) weights of what skin bends with, 0 where a region does not feel an input; samples (s, p) what it bent with
+    in the poses it was learnt from
     """
 
     muscle_names: tuple[str, ...]
@@ -56,15 +58,15 @@ class Rig:
     regions: tuple[Region, ...]
 
     @cached_property
-    def _centres(self) -> np.ndarray:
-        """(g, p, s) the samples as each region sees them."""
-        return np.ascontiguousarray((self.samples[None] * self.scale[:, None]).transpose(0, 2, 1))
+    def _weight(self) -> np.ndarray:
+        """(g, p) of each squared difference in the squared distance of two poses."""
+        return np.ascontiguousarray(self.scale**2)
 
     @cached_property
-    def _distance(self) -> tuple[np.ndarray, np.ndarray]:
-        """(g, 1, s) squared distance of each sample from rest, and its kernel with rest."""
-        size = (self._centres**2).sum(axis=1)[:, None]
-        return size, matern(size)
+    def _samples(self) -> tuple[np.ndarray, np.ndarray]:
+        """(p, s) the samples, and the kernel of each with rest (g, 1, s)."""
+        across = np.ascontiguousarray(self.samples.T)
+        return across, matern(self._weight @ across**2)[:, None]
 
     def skin(self, control: Control) -> np.ndarray:
         """(n, 3) mm, the skin in a pose."""
@@ -76,24 +78,24 @@ class Rig:
 
     def own(self, inputs: np.ndarray) -> np.ndarray:
         """(f, n, 3) mm: the skin's own motion for f rows of inputs (f, p)."""
-        forces, progress = (x.astype(np.float32) for x in coordinates(self.spending, self.sphincters, inputs))
+        forces, bending = (x.astype(np.float32) for x in coordinates(self.spending, self.sphincters, inputs))
         out = np.zeros((len(inputs), len(self.frame.rest), 3), np.float32)
-        for region, kernel in zip(self.regions, self._kernels(progress), strict=True):
+        for region, kernel in zip(self.regions, self._kernels(bending), strict=True):
             moved = (kernel @ region.weights + forces @ region.linear) @ region.modes
             out[:, region.vertices] = moved.reshape(len(inputs), -1, 3)
         return out
 
-    def _kernels(self, progress: np.ndarray) -> np.ndarray:
+    def _kernels(self, bending: np.ndarray) -> np.ndarray:
         """(g, f, s) kernel of every pose with every sample as each region sees them, less what either has with rest."""
-        at = progress[None] * self.scale[:, None]
-        here = (at**2).sum(axis=2)[..., None]
-        there, rest = self._distance
-        return matern(here + there - 2 * (at @ self._centres)) - matern(here) * rest
+        across, rest = self._samples
+        squared = np.stack([self._weight @ (across - at[:, None]) ** 2 for at in bending], axis=1)
+        return matern(squared) - matern(self._weight @ (bending**2).T)[..., None] * rest
 
 
 def coordinates(spending: Spending, sphincters, inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """What the skin is linear in (f, p) and what it bends with (f, p): forces and progress, each followed by the other
-    inputs. Forces count 1 for a muscle alone at its end. A muscle that has no entries in the tissue (of a lid) stays."""
+    """What the skin is linear in (f, p), forces, and what it bends with (f, p), between the progress of the muscles and what
+    is asked of them; each followed by the other inputs. Forces count 1 for a muscle alone at its end. A muscle that has
+    no entries in the tissue (of a lid) stays."""
     k = len(spending.mutual)
     activation, others = inputs[:, :k], inputs[:, k:].copy()
     forces, progress = spending.forces(activation, others)
@@ -105,4 +107,5 @@ def coordinates(spending: Spending, sphincters, inputs: np.ndarray) -> tuple[np.
     own = np.diag(spending.mutual)
     without = ~spending.mutual.any(axis=1)
     progress = np.where(without, activation, progress)
-    return np.concatenate([forces * (1 + own), others], axis=1), np.concatenate([progress, others], axis=1)
+    bending = progress + _ASKED * (activation - progress)
+    return np.concatenate([forces * (1 + own), others], axis=1), np.concatenate([bending, others], axis=1)

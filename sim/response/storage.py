@@ -12,7 +12,7 @@ from .jaw_frame import JawFrame
 from .rig import Region, Rig
 from .spending import Spending
 
-FORMAT = "headshop-response/2"
+FORMAT = "headshop-response/3"
 
 
 def to_bytes(rig: Rig, accuracy: dict | None = None) -> bytes:
