@@ -132,7 +132,7 @@ def test_images_count_for_as_much_as_both_sides_are_alike(reference, reference_m
     np.testing.assert_array_equal(opposite[opposite], np.arange(len(opposite)))
     own = rng.normal(size=(5, len(opposite), 3))
     own[1] = own[0, opposite] * (-1, 1, 1)
-    for lopsided, alike in ((0.0, 1.0), (3.0, 0.1**0.5)):  # two that differ by noise of thrice their size
+    for lopsided, alike in ((0.0, 1.0), (3.0, 2 / 11)):  # one and the same and noise of thrice its size
         own[1] += lopsided * rng.normal(size=own[1].shape)
         seen = mirror.seen_twice(names, inputs, own, opposite)
         assert seen.real.sum() == 5 and len(seen.own) == 5 + 3 and len(seen.both) == 2
