@@ -3,6 +3,10 @@
 
 The two loops of Nocedal and Wright 2006, algorithm 7.4, pass over every pair by itself; the same inverse as one product of
 tall matrices (Byrd, Nocedal and Schnabel 1994, Math. Program. 63, theorem 2.2) passes over the memory four times in all.
+
+The matrix A that a descent steps by holds a spring as firmly across as along, which is too firm for most steps and not
+firm enough where surfaces touch. So it counts by what it was off by in the steps made: the median, over the pairs, of the
+ratio of 7.20 in Nocedal and Wright, in the norm of A^-1.
 """
 
 import numpy as np
@@ -11,7 +15,7 @@ import numpy as np
 class Curvature:
     """The last steps s, changes y of the gradient along them, and A^-1 y, with A the matrix that a descent steps by."""
 
-    def __init__(self, memory: int = 10):
+    def __init__(self, memory: int = 20):
         self._memory = memory
         self.clear()
 
@@ -46,7 +50,9 @@ class Curvature:
         upper = np.triu(self._across[order])
         self._root = np.zeros((k, k))
         self._root[order] = np.linalg.inv(upper)
-        self._middle = self._inner[:k, :k] + np.diag(np.diag(self._across)[:k])
+        along = np.diag(self._across)[:k]
+        self._scale = float(np.median(along / np.diag(self._inner)[:k]))
+        self._middle = self._scale * self._inner[:k, :k] + np.diag(along)
 
     def applied(self, gradient, solved):
         """The inverse curvature times ``gradient``, from A^-1 times that, ``solved``; both of one shape."""
@@ -56,5 +62,5 @@ class Curvature:
         steps, tail = self._steps[:k], self._solved[:k]
         flat = gradient.ravel()
         along = self._root @ (steps @ flat)
-        back = self._root.T @ (self._middle @ along - tail @ flat)
-        return solved + (back @ steps - along @ tail).reshape(solved.shape)
+        back = self._root.T @ (self._middle @ along - self._scale * (tail @ flat))
+        return self._scale * solved + (back @ steps - (self._scale * along) @ tail).reshape(solved.shape)
