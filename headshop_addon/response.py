@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A head's response rig, kept on its skin: learnt from the simulation once, then a pose takes a millisecond.
 
-The ID property ``headshop_response`` holds its bytes and ``headshop_response_of`` the fingerprint of the head that it
-was learnt on; reshaping the head makes it out of date.
+The ID property ``headshop_response`` holds its bytes and ``headshop_response_of`` the fingerprint of the head and of the
+simulation that it was learnt from; reshaping the head makes it out of date, and so does a version that simulates otherwise.
 """
 
 import zlib
@@ -13,6 +13,7 @@ import numpy as np
 from ..sim.acting import models
 from ..sim.errors import InputError
 from ..sim.progress import Work, portion
+from ..sim.response.engine import engine_mark
 from . import bridge, heads
 
 RESPONSE = "headshop_response"
@@ -20,8 +21,8 @@ OF = "headshop_response_of"
 
 
 def fingerprint(skin: bpy.types.Object) -> int:
-    """A number that changes when the head's rest shape or anatomy does."""
-    mark = zlib.crc32(str(skin.get(heads.ANATOMY, "")).encode())
+    """A number that changes when the head's rest shape or anatomy does, or the simulation."""
+    mark = zlib.crc32(str(skin.get(heads.ANATOMY, "")).encode(), engine_mark())
     for obj in heads.parts_of(skin).values():
         mark = zlib.crc32(np.ascontiguousarray(bridge.read_positions(obj)).tobytes(), mark)
     return mark
@@ -33,7 +34,8 @@ def is_prepared(skin: bpy.types.Object) -> bool:
 
 
 def is_current(skin: bpy.types.Object, mark: int | None = None) -> bool:
-    """Whether the response kept with the head was learnt on the head as it is; ``mark`` is its `fingerprint`, if known."""
+    """Whether the response kept with the head was learnt on the head as it is and from this simulation; ``mark`` is its
+    `fingerprint`, if known."""
     return is_prepared(skin) and skin.get(OF) == f"{fingerprint(skin) if mark is None else mark:08x}"
 
 
@@ -62,14 +64,17 @@ def stored(skin: bpy.types.Object):
 
     Raises
     ------
-    InputError : there is none, it cannot be read, or the head was reshaped since.
+    InputError : there is none, it cannot be read, or the head was reshaped since, or is simulated otherwise.
     """
     from ..sim.response.storage import from_bytes
 
     if not is_prepared(skin):
         raise InputError(f"The response of {heads.head_name(skin)!r} was not prepared yet.")
     if not is_current(skin):
-        raise InputError(f"{heads.head_name(skin)!r} was reshaped since its response was prepared: prepare it again.")
+        raise InputError(
+            f"{heads.head_name(skin)!r} was reshaped since its response was prepared, or another version prepared it: "
+            "prepare it again."
+        )
     return from_bytes(bytes(skin[RESPONSE]), heads.read_head(skin))
 
 

@@ -84,7 +84,7 @@ def learnt(reference, reference_model):
 def chosen(learnt, reference):
     """Few shape keys, chosen on few poses."""
     actor = actor_of(learnt, reference)
-    poses = playing.played_poses(actor, np.random.default_rng(0), few=40, many=20)
+    poses = playing.played_poses(actor, np.random.default_rng(0), few=40, many=20, composed=20)
     some = (ZYGOMATICUS, LEVATOR, "jaw_open")
     rng = np.random.default_rng(1)
     poses += [{name: rng.uniform() for name in some} for _ in range(80)]
@@ -203,6 +203,26 @@ def test_sliders_play_what_was_learnt(addon, learnt, reference):
         response.stored(skin)
     live.set_sliders(skin, {ZYGOMATICUS: 0.5})
     assert following.kept[skin.session_uid].acting is not following.INSTANT
+
+
+def test_a_response_learnt_from_another_simulation_is_out_of_date(bpy, learnt, reference, monkeypatch, tmp_path):
+    from headshop.headshop_addon import heads, response
+    from headshop.sim.response.engine import engine_mark
+
+    heads.create_head(reference, "Fran")
+    skin = heads.find_heads()[0]
+    _kept(skin, learnt)
+    assert response.is_current(skin)
+    monkeypatch.setattr(response, "engine_mark", lambda: 1)
+    assert not response.is_current(skin)
+    with pytest.raises(InputError, match="another version"):
+        response.stored(skin)
+    marks = {engine_mark()}
+    for number, text in enumerate(("lid = 1500.0", "lid = 1500.0\r\n", "lid = 1400.0")):
+        (tmp_path / str(number) / "sim/tissue").mkdir(parents=True)
+        (tmp_path / str(number) / "sim/tissue/parameters.py").write_text(text)
+        marks.add(engine_mark(tmp_path / str(number)))
+    assert len(marks) == 3  # the ends of lines are the system's
 
 
 def test_what_was_learnt_is_appended_with_the_head(bpy, learnt, reference, tmp_path):

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Poses that the rig plays so that shape keys can be fitted to them: every slider alone on its way, pairs, few and many."""
+"""Poses that the rig plays so that shape keys can be fitted to them: every slider alone on its way, a few, many, and
+expressions as artists compose them."""
 
 import numpy as np
 
@@ -8,18 +9,20 @@ from ..progress import Progress, Work
 from ..tissue.muscle_field import JAW_MUSCLES, base_name
 from ..tissue.posing import posed_parts
 from .actor import Actor
-from .mixtures import SIGNED, mixed_pose
+from .mixtures import SIGNED, composed_pose, mixed_pose
 from .quantities import sliders
 
-#: How far each slider is moved alone, besides 1; how many poses of a few sliders and of many.
+#: How far each slider is moved alone, besides 1; how many poses of a few sliders, of many, and composed ones.
 _WAY = (0.08, 0.25, 0.5, 0.75, -0.3, -0.65, -1.0)
-_FEW, _MANY = 900, 700
+_FEW, _MANY, _COMPOSED = 700, 400, 1500
 #: Every so many of these, all muscles at once.
 _CROWD = 4
 
 
-def played_poses(actor: Actor, rng: np.random.Generator, few: int = _FEW, many: int = _MANY) -> list[dict[str, float]]:
-    """Channel values of each pose: every slider alone at 1, then on its way, then mixtures."""
+def played_poses(
+    actor: Actor, rng: np.random.Generator, few: int = _FEW, many: int = _MANY, composed: int = _COMPOSED
+) -> list[dict[str, float]]:
+    """Channel values of each pose: every slider alone at 1, then on its way, then mixtures, then composed expressions."""
     names = sliders(actor.rig)
     poses = [{name: 1.0} for name in names]
     poses += [{name: value} for name in names for value in _WAY if value > 0 or name in SIGNED]
@@ -33,7 +36,7 @@ def played_poses(actor: Actor, rng: np.random.Generator, few: int = _FEW, many: 
         pose |= mixed_pose(actor.muscle_names, rng).values()
         jaw = [name for name in actor.muscle_names if base_name(name) in JAW_MUSCLES]
         poses.append(pose | _some(jaw, rng.integers(0, 3), rng))
-    return poses
+    return poses + [composed_pose(actor.muscle_names, rng).values() for _ in range(composed)]
 
 
 def _some(names, count: int, rng: np.random.Generator) -> dict[str, float]:
