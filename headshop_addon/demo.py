@@ -51,19 +51,18 @@ def run(folder: Path, seed: int | None = None) -> None:
         scan_file, landmark_file, _ = write_sample(sample, folder / "sample")
         say(f"{scan_file}: {len(sample.scan.faces):,} triangles of a person who does not exist")
 
-    from .headless import start_blender
+    from .headless import set_up_view, start_blender
 
     start_blender()
     from ..sim.adapt.landmarks import read_landmarks
     from . import baking, pipeline
     from .contact_sheet import render_sheet
     from .movie import render_movie
-    from .stage import set_stage
 
     with _step("build") as say:
         landmarks = read_landmarks(landmark_file)
         skin, report = _finish(pipeline.build_file(scan_file, landmarks, "Sample"))
-        set_stage(_scene(), skin)
+        set_up_view(skin)
         fit, anatomy = report["fit"], report["anatomy"]
         say(f"head with {anatomy['muscles']} muscles, {fit['mean_mm']:.2f} mm from the scan on average")
     with _step("act") as say:

@@ -3,7 +3,7 @@
 
 import bpy
 
-from ..headshop_addon import active, heads, muscle_names, response
+from ..headshop_addon import active, heads, jobs, muscle_names, response
 from .common import SidebarPanel, hint, progress
 
 
@@ -15,7 +15,8 @@ class HEADSHOP_PT_muscles(SidebarPanel, bpy.types.Panel):
     def draw(self, context):
         """Which head, whether it follows, and what to do with all sliders."""
         layout = self.layout
-        progress(layout, "muscles")
+        if progress(layout, "muscles"):
+            return
         skin = active.skin(context)
         if skin is None:
             hint(layout, context, "Muscles belong to a head: build one first.")
@@ -54,7 +55,7 @@ class HEADSHOP_PT_controls(_Sliders, bpy.types.Panel):
 
     def draw(self, context):
         """The jaw above, then left and right beside each other as on the screen."""
-        progress(self.layout, "muscles")
+        self.layout.enabled = jobs.running is None
         group = active.skin(context).headshop.controls
         column = self.layout.column(align=True)
         for name in ("jaw_open", "jaw_forward", "jaw_side"):
@@ -76,7 +77,7 @@ class HEADSHOP_PT_controls(_Sliders, bpy.types.Panel):
 
 def _draw_region(self, context):
     """Each muscle's name, and under it its sides: the subject's right on the left, as one sees the face."""
-    progress(self.layout, "muscles")
+    self.layout.enabled = jobs.running is None
     group = active.skin(context).headshop.muscles
     for names in muscle_names.by_region()[self.bl_label]:
         column = self.layout.column(align=True)

@@ -216,12 +216,14 @@ def test_what_is_inside_can_be_shown(addon, reference):
     assert draw_all(addon)["HEADSHOP_PT_build"].count("Muscles") == 1
 
 
-def test_a_running_job_is_shown(addon):
-    from headshop.headshop_addon import jobs
+@pytest.mark.parametrize("panel", ["build", "muscles", "bake"])
+def test_a_running_job_is_shown_once(addon, reference, panel):
+    from headshop.headshop_addon import heads, jobs
 
-    jobs.running = jobs.Running("Build Head", "build", 0.42, "Refining")
+    heads.create_head(reference, "Ref")
+    jobs.running = jobs.Running("Some Job", panel, 0.42, "Refining")
     try:
         drawn = draw_all(addon)
-        assert [name for name in drawn if "Build Head: 42%" in drawn[name]] == ["HEADSHOP_PT_build"]
+        assert [name for name in drawn if "Some Job: 42%" in drawn[name]] == [f"HEADSHOP_PT_{panel}"]
     finally:
         jobs.running = None

@@ -121,11 +121,18 @@ def skin_look():
     return [*shown, area().spaces.active.shading.color_type]
 
 
+def prepared():
+    """Whether the head holds what was learnt of its simulation."""
+    from bl_ext.user_default.headshop.headshop_addon import response
+
+    return response.is_prepared(skin())
+
+
 def settled():
     """Whether every face has come to rest where its sliders say."""
-    from bl_ext.user_default.headshop.headshop_addon import live
+    from bl_ext.user_default.headshop.headshop_addon import following
 
-    return all(following.settled for following in live._following.values())
+    return all(each.settled for each in following.kept.values())
 
 
 def _answer():

@@ -179,13 +179,55 @@ def act():
     shot("15_joy")
 
 
+def prepare():
+    """The instant preview offers to be prepared, and Esc leaves the head without one."""
+    scroll_up()
+    x, y = find("headshop.model", keys="ctrl+shift+c", across=0.5)
+    click(x, y)
+    wait_for("skin().headshop.model == 'INSTANT'", 10)
+    shot("16_instant")
+    press("prepare_response")
+    wait_for("job().count('Simulating')", 60)
+    shot("17_preparing")
+    key("Escape")
+    wait_for("not job()", 60)
+    assert not ask("prepared()")
+    click(*find("headshop.model", keys="ctrl+shift+c", across=0.2))
+    wait_for("skin().headshop.model == 'SIMULATED'", 10)
+
+
+def animate():
+    """Sliders keyed at two frames are baked with dynamics; one button takes the animation off again."""
+    keys = ask("[k.name for k in skin().data.shape_keys.key_blocks]")
+    ask("setattr(bpy.context.scene, 'frame_end', 4)")
+    scroll_up()
+    press("key_sliders", across=0.25)
+    ask("bpy.context.scene.frame_set(4)")
+    press("reset_muscles", across=0.75)
+    press("key_sliders", across=0.25)
+    click(*find("headshop.dynamics", keys="ctrl+shift+c"))
+    wait_for("skin().headshop.dynamics", 10)
+    shot("19_dynamics")
+    press("bake_performance")
+    wait_for("job()", 20)
+    wait_for("not job()", 300)
+    assert ask("moved('Performance_01')") > 1.0 and not ask("skin().headshop.live")
+    ask("bpy.context.scene.frame_set(2)")
+    shot("20_animation")
+    press("remove_baked", across=0.6)
+    wait_for("skin().headshop.live", 20)
+    assert set(ask("[k.name for k in skin().data.shape_keys.key_blocks]")) <= set(keys)
+    shot("21_removed")
+    ask("bpy.context.scene.frame_set(1)")
+
+
 def bake():
     """Baking shows progress, and Esc leaves no shape key behind."""
     ask("bpy.ops.ed.undo_push(message='Tour')")
     keys = ask("[k.name for k in skin().data.shape_keys.key_blocks]")
     press("bake_expressions")
     wait_for("job().count('Simulating')", 60)
-    shot("16_baking")
+    shot("18_baking")
     key("Escape")
     wait_for("not job()", 60)
     assert ask("[k.name for k in skin().data.shape_keys.key_blocks]") == keys
@@ -196,14 +238,26 @@ def disable():
     ask("bpy.ops.preferences.addon_disable(module='bl_ext.user_default.headshop')")
     assert ask("[name for name in dir(bpy.types) if 'HEADSHOP' in name]") == []
     assert not ask("hasattr(bpy.types.Object, 'headshop')")
-    shot("17_disabled")
+    shot("22_disabled")
 
 
 def main():
     """The whole tour."""
     choose_tab()
     shot("01_start")
-    for step in (add_sample, find_landmarks, click_landmarks, build, show_fit, degrade, act, bake, disable):
+    for step in (
+        add_sample,
+        find_landmarks,
+        click_landmarks,
+        build,
+        show_fit,
+        degrade,
+        act,
+        prepare,
+        bake,
+        animate,
+        disable,
+    ):
         say(step.__doc__)
         step()
     say("done")
