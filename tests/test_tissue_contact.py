@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 from headshop.sim.acting.arkit import poses
 from headshop.sim.acting.pose import Pose, control, pose_from
 from headshop.sim.anatomy.inside import inside
-from headshop.sim.mesh import Mesh
+from headshop.sim.mesh import Mesh, vertex_normals
 from headshop.sim.mesh_subdivision import limit, smoother, subdivision
 from headshop.sim.tissue.clearing import PAIRS, cleared, surfaces_of
 from headshop.sim.tissue.drawn_samples import drawn_samples, planes_of
@@ -133,6 +133,25 @@ def test_gums_take_their_lining_along(reference_model, reference):
     goal = np.where(below[:, None] > 0, rest @ pose.rotation.T + pose.translation, rest)
     away = np.linalg.norm(moved - goal, axis=1)[firm]
     assert away.max() < 1 and np.median(away) < 0.1
+
+
+def test_flesh_stays_between_skin_and_lining(reference_model):
+    """A jaw opened as far as it goes draws the lips thin over the teeth."""
+    wide = control(reference_model, Pose(jaw_open=1.0))
+    flesh = reference_model.drawn.flesh
+
+    def thin(skin):
+        normals = vertex_normals(skin, reference_model.contacts.triangles)
+        facing = flesh.outer.at(normals) - flesh.inner.at(normals)
+        facing /= np.linalg.norm(facing, axis=1, keepdims=True)
+        apart = np.einsum("ij,ij->i", flesh.outer.at(skin) - flesh.inner.at(skin), facing)
+        return apart / np.linalg.norm(flesh.outer.at(rest) - flesh.inner.at(rest), axis=1)
+
+    rest = rest_state(reference_model).skin
+    assert len(flesh.least) > 400 and thin(rest).min() > 0.8
+    frames = Frames(reference_model)
+    held = frames.follow(wide, 200, 0.005).skin
+    assert (thin(held) < 0.27).sum() > 5 and thin(frames.cleared().skin).min() > 0.27
 
 
 def test_lids_go_a_little_with_a_sideways_gaze(reference_model, reference):

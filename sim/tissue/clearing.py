@@ -11,6 +11,7 @@ import numpy as np
 from ..mesh import vertex_normals
 from .drawn_contact import eye_contacts, lip_contacts
 from .drawn_samples import planes_of
+from .flesh import flesh_contacts
 from .lid_meeting import met
 from .planes import empty_planes, joined, project, row_depths, touching
 from .structures import Model
@@ -55,13 +56,15 @@ def surfaces_of(model: Model, pose, positions) -> dict:
 
 
 def cleared(model: Model, pose, positions) -> np.ndarray:
-    """(3 n, 3) mm: ``positions`` with the drawn skin out of eyeballs, teeth, gums and the other lip, fascia out of
-    bone, and shut lids met."""
+    """(3 n, 3) mm: ``positions`` with the drawn skin out of eyeballs, teeth, gums and the other lip, flesh between
+    skin and lining, fascia out of bone, and shut lids met."""
     out = met(model, pose.shut, positions)
     out = out.copy() if out is positions else out
     n = model.count
     for _ in range(ROUNDS):
         found = surfaces_of(model, pose, out)
+        normals = vertex_normals(out[:n], model.contacts.triangles)
+        found["flesh"] = planes_of([flesh_contacts(model.drawn.flesh, out[:n], normals)], n)
         out = project(found.pop("fascia_skull"), out, rounds=1)
         move = way_out(joined(*found.values()), out, model.layers.free[:n])
         if move is None:

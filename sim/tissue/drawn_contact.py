@@ -17,6 +17,7 @@ from ..mesh import vertex_normals
 from .arch import Arch, wall_planes
 from .drawn_samples import SPACING, Samples, drawn_samples, planes_of
 from .eye_surface import eyeball_radius
+from .flesh import Flesh, build_flesh
 from .geometry import short_diagonals
 from .gingiva import attached
 from .planes import Planes
@@ -79,14 +80,15 @@ def _within(mesh, lower, points, places, spacing) -> Within:
 
 @dataclass(frozen=True, eq=False)
 class DrawnSurfaces:
-    """teeth, eyes: what may touch them; lips: the two, fine_lips: the same more closely; rigid: part ->
-    mesh of what is solid; nodes (3 n, 3) mm at rest; fascia: bone -> columns over
+    """teeth, eyes: what may touch them; lips: the two, fine_lips: the same more closely; flesh: both faces of lips and cheeks;
+    rigid: part -> mesh of what is solid; nodes (3 n, 3) mm at rest; fascia: bone -> columns over
     it."""
 
     teeth: tuple[Before, ...]
     eyes: tuple[Before, ...]
     lips: Lips
     fine_lips: Lips
+    flesh: Flesh
     rigid: dict
     nodes: np.ndarray
     fascia: dict
@@ -147,7 +149,9 @@ def build_drawn(head: Head, layers: Layers, arches: tuple[Arch, ...], lids_of_bo
     fascia = {k: np.flatnonzero(on_bone & over[k]) for k in over if k in rigid and (on_bone & over[k]).any()}
     lips = [(group[k] > 0.3) & free for k in ("lip_upper", "lip_lower")]
     lips = [_lips(faces, skin, lips, spacing) for spacing in (SPACING, FINE)]
-    return DrawnSurfaces(tuple(teeth), tuple(eyes), *lips, rigid, layers.nodes, fascia)
+    inside = np.asarray(head.groups.get("inner", np.zeros(n))) > 0.5
+    flesh = build_flesh(faces, skin, mouth, inside)
+    return DrawnSurfaces(tuple(teeth), tuple(eyes), *lips, flesh, rigid, layers.nodes, fascia)
 
 
 def _lips(faces, skin, groups, spacing) -> Lips:
