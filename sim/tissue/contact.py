@@ -22,6 +22,8 @@ from .layers import Layers
 from .planes import Planes, empty_planes
 
 _LIP_REACH = 6.0
+#: mm from the bone beyond which fascia is not held off it: far more than it moves before bone is looked for again.
+_BONE_REACH = 6.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,15 +88,15 @@ def bone_planes(model_bones, layers: Layers, fascia: np.ndarray, rotation, trans
         points = fascia[bone.column]
         if bone.lower:
             points = (points - translation) @ rotation
-        _, near = bone.tree.query(points)
-        n = bone.normal[near]
-        keep = np.einsum("ij,ij->i", n, layers.bone_normal[bone.column]) > 0.5
-        at = bone.points[near]
+        distance, near = bone.tree.query(points, distance_upper_bound=_BONE_REACH)
+        rows = np.flatnonzero(np.isfinite(distance))
+        rows = rows[np.einsum("ij,ij->i", bone.normal[near[rows]], layers.bone_normal[bone.column[rows]]) > 0.5]
+        at, n = bone.points[near[rows]], bone.normal[near[rows]]
         if bone.lower:
             at, n = at @ rotation.T + translation, n @ rotation.T
-        node.append(bone.column[keep] + len(fascia))
-        normal.append(n[keep])
-        level.append((np.einsum("ij,ij->i", at, n) + bone.margin)[keep])
+        node.append(bone.column[rows] + len(fascia))
+        normal.append(n)
+        level.append(np.einsum("ij,ij->i", at, n) + bone.margin[rows])
     if not node:
         return empty_planes()
     node, normal, level = (np.concatenate(x) for x in (node, normal, level))

@@ -4,6 +4,8 @@
 The two loops of Nocedal and Wright 2006, algorithm 7.4, pass over every pair by itself; the same inverse as one product of
 tall matrices (Byrd, Nocedal and Schnabel 1994, Math. Program. 63, theorem 2.2) passes over the memory four times in all.
 
+The tables are in single precision: they only say which way to go, not where the rest is.
+
 The matrix A that a descent steps by holds a spring as firmly across as along, which is too firm for most steps and not
 firm enough where surfaces touch. So it counts by what it was off by in the steps made: the median, over the pairs, of the
 ratio of 7.20 in Nocedal and Wright, in the norm of A^-1.
@@ -33,7 +35,7 @@ class Curvature:
             return
         if not self._order:
             size = self._memory
-            self._steps, self._changes, self._solved = np.zeros((3, size, step.size))
+            self._steps, self._changes, self._solved = np.zeros((3, size, step.size), np.float32)
             self._across, self._inner = np.zeros((2, size, size))
         at = self._next
         if len(self._order) == self._memory:
@@ -43,7 +45,8 @@ class Curvature:
         self._steps[at], self._changes[at], self._solved[at] = step.ravel(), change.ravel(), solved.ravel()
         self._across[:, at] = self._steps @ self._changes[at]
         self._across[at] = self._changes @ self._steps[at]
-        self._inner[at] = self._inner[:, at] = self._changes @ self._solved[at]
+        self._inner[at] = self._changes @ self._solved[at]
+        self._inner[:, at] = self._inner[at]
         k = len(self._order)
         rows = np.array(self._order)
         order = np.ix_(rows, rows)
@@ -60,7 +63,8 @@ class Curvature:
         if not k:
             return solved
         steps, tail = self._steps[:k], self._solved[:k]
-        flat = gradient.ravel()
+        flat = gradient.ravel().astype(np.float32)
         along = self._root @ (steps @ flat)
         back = self._root.T @ (self._middle @ along - self._scale * (tail @ flat))
-        return self._scale * solved + (back @ steps - (self._scale * along) @ tail).reshape(solved.shape)
+        learnt = back.astype(np.float32) @ steps - (self._scale * along).astype(np.float32) @ tail
+        return self._scale * solved + learnt.reshape(solved.shape)

@@ -48,7 +48,9 @@ class Samples:
     @cached_property
     def _columns(self) -> np.ndarray:
         """(k, 3 w) columns of `along`, axis by axis."""
-        return (self.node[:, None] * 3 + np.arange(3)[:, None]).reshape(len(self), -1).astype(np.int32)
+        return (
+            (self.node[:, None] * 3 + np.arange(3)[:, None]).reshape(len(self), 3 * self.node.shape[1]).astype(np.int32)
+        )
 
 
 def samples_of(rows: sparse.csr_matrix) -> Samples:

@@ -205,9 +205,21 @@ def find_contacts(model: Model, pose: Pose, positions) -> Planes:
     """The planes that matter near ``positions`` (3 n, 3)."""
     n = model.count
     skin = positions[:n]
-    normals = vertex_normals(skin, model.contacts.triangles)
+    normals = vertex_normals(skin, _facing(model))
     return joined(
         contact.bone_planes(model.contacts.bones, model.layers, positions[n : 2 * n], pose.rotation, pose.translation),
         contact.sheet_contacts(model.contacts, normals),
         drawn_contacts(model.drawn, skin, normals, pose.rotation, pose.translation, pose.gaze_of),
     )
+
+
+def _facing(model: Model) -> np.ndarray:
+    """(t, 3) the triangles at the vertices whose normals contacts ask for: those of the lips and of sheets back to back."""
+    if "facing" not in model.cache:
+        asked = np.zeros(model.count, bool)
+        asked[model.contacts.sheets[:, 1]] = True
+        for lip in model.drawn.lips.points:
+            asked[lip.rows.indices] = True
+        triangles = model.contacts.triangles
+        model.cache["facing"] = triangles[asked[triangles].any(axis=1)]
+    return model.cache["facing"]

@@ -18,7 +18,7 @@ from .solver import descend, factorised, minimise, rest_state
 from .structures import Control, Model, State
 
 #: Steps that a frame is given, and the mm of a step at which fewer do.
-STEPS, TOLERANCE = 8, 0.05
+STEPS, TOLERANCE = 6, 0.05
 #: The mm of a step at which a pose counts as settled.
 SETTLED = 0.01
 #: The last step is taken without a look at the energy behind it if no node moves farther, mm.
