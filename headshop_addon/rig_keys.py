@@ -42,7 +42,7 @@ def bake_rig(skin: bpy.types.Object) -> Work:
     poses = played_poses(actor, np.random.default_rng(0))
     played = yield from portion(played_parts(actor, poses), 0.8, 0.85)
     lowest = {name: -1.0 if name in SIGNED else 0.0 for name in sliders(rig)}
-    keys: Keys = yield from portion(chosen_keys(rig, poses, played, lowest), 0.85, 0.99)
+    keys: Keys = yield from portion(chosen_keys(rig, poses, played, lowest, head.eyes), 0.85, 0.99)
     yield Progress(1.0, "Writing shape keys")
     write_rig(skin, keys)
     return {

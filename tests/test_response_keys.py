@@ -84,7 +84,7 @@ def learnt(reference, reference_model):
 def chosen(learnt, reference):
     """Few shape keys, chosen on few poses."""
     actor = actor_of(learnt, reference)
-    poses = playing.played_poses(actor, np.random.default_rng(0), few=40, many=20, composed=20)
+    poses = playing.played_poses(actor, np.random.default_rng(0), few=40, many=20, composed=20, looks=10)
     some = (ZYGOMATICUS, LEVATOR, "jaw_open")
     rng = np.random.default_rng(1)
     poses += [{name: rng.uniform() for name in some} for _ in range(80)]

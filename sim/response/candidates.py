@@ -62,8 +62,10 @@ def _of_lids() -> dict[str, Formula]:
             for left, top, right in zip(STEPS, STEPS[1:], STEPS[2:], strict=False):
                 found[f"{name} {top:g}"] = tent(of(name), left, top, right)
         found |= _of_gaze(side)
-        up = f"gaze {side} z"
-        found |= {f"{up}*lid {lid} {side}": of(up) * of(f"lid {lid} {side}") for lid in ("upper", "lower")}
+        found[f"gaze {side} x left"] = most(of(f"gaze {side} x"), 0.0)
+        for lid in (f"lid upper {side}", f"lid lower {side}"):
+            for look in (f"gaze {side} x", f"gaze {side} z"):
+                found |= {f"{look}*{lid}": of(look) * of(lid), f"{look} 2*{lid}": _square(look) * of(lid)}
     return found
 
 

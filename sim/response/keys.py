@@ -4,7 +4,8 @@
 A slider's key is the response to it alone at 1; the jaw's muscles have none, they move the jaw. What is missing is
 fitted with formulas of the sliders (`quantities`): a muscle's force beyond its slider, steps of jaw and lids on their
 way, and products of two quantities that move the same skin. Out of all these the ones that explain most are taken one
-by one (orthogonal least squares: Chen, Billings and Luo 1989), on poses that the rig plays.
+by one (orthogonal least squares: Chen, Billings and Luo 1989), on poses that the rig plays. What is left of a small motion
+weighs more than as much of a large one: a hundred keys cannot follow extremes, and must not spoil a smile for them.
 """
 
 import re
@@ -19,11 +20,15 @@ from .formula import Formula
 from .quantities import quantities, sliders, values_of
 
 #: Driven keys of the skin at most, and of a part that moves rigidly.
-DRIVEN, DRIVEN_OF_A_PART = 150, 18
+DRIVEN, DRIVEN_OF_A_PART = 200, 18
 #: mm rms over a part: no more keys are added once this little is left; mm that a key must move anything by at its most.
 _ENOUGH, _SEEN = 0.02, 0.02
 #: Ridge of the last fit, a share of each column's own square; principal directions that the choice looks at.
 _RIDGE, _DIRECTIONS = 1e-4, 100
+#: A pose weighs as one over its motion beyond the sliders (mm rms and this) to this power.
+_SMALL, _LESS = 0.2, 0.8
+#: Lids, within so many radii of an eye's centre, weigh more in the choice: an eyeball shows through them at once.
+_LIDS, _CLOSELY = 1.35, 4.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,10 +56,11 @@ class Keys:
         return out + sum(shape * float(formula.value(known)[0]) for formula, shape in found.driven.values())
 
 
-def chosen_keys(rig, poses, played, lowest: dict[str, float]) -> Work:
+def chosen_keys(rig, poses, played, lowest: dict[str, float], eyes=()) -> Work:
     """`Keys` from poses (a dict of channel values each) and ``played``: part -> displacements (f, n, 3) mm in them.
 
-    The first poses are every slider alone at 1, in the order of `quantities.sliders`. lowest: slider -> least value
+    The first poses are every slider alone at 1, in the order of `quantities.sliders`. lowest: slider -> least value;
+    eyes: of the head
     """
     names = sliders(rig)
     at = {name: np.array([values.get(name, 0.0) for values in poses]) for name in names}
@@ -71,8 +77,12 @@ def chosen_keys(rig, poses, played, lowest: dict[str, float]) -> Work:
         columns = np.stack([formula.value(known) for formula in options.values()], axis=1)
         mates = _mates(list(options))
         enough = _ENOUGH * np.sqrt(motion[0].size / 3)
-        picked = yield from portion(_picked(columns, left, mates, most, enough), start, stop)
-        shapes = _fitted(columns[:, picked], left)
+        weight = _weights(left)
+        looked = left * weight
+        if part == "skin":
+            looked *= _closely(rig.frame.rest, eyes)
+        picked = yield from portion(_picked(columns * weight, looked, mates, most, enough), start, stop)
+        shapes = _fitted(columns[:, picked] * weight, left * weight)
         peaks = np.abs(shapes).max(axis=1) * np.abs(columns[:, picked]).max(axis=0)
         labels = list(options)
         parts[part] = PartKeys(
@@ -90,6 +100,20 @@ def chosen_keys(rig, poses, played, lowest: dict[str, float]) -> Work:
         for formula, _ in parts[part].driven.values():
             used |= set(formula.names())
     return Keys({name: lowest.get(name, 0.0) for name in names}, _needed(formulas, used), parts)
+
+
+def _weights(left) -> np.ndarray:
+    """(f, 1) of each pose, 1 on (quadratic) average, from what its sliders leave to the driven keys (f, 3 n) mm."""
+    weight = (np.sqrt(3 * (left**2).mean(axis=1, keepdims=True)) + _SMALL) ** -_LESS
+    return weight / np.sqrt((weight**2).mean())
+
+
+def _closely(rest, eyes) -> np.ndarray:
+    """(3 n,) how closely each coordinate of the skin is looked at."""
+    lids = np.zeros(len(rest), bool)
+    for eye in eyes:
+        lids |= np.linalg.norm(rest - eye.centre, axis=1) < _LIDS * eye.radius
+    return np.where(lids, _CLOSELY, 1.0).repeat(3)
 
 
 def _mates(labels: list[str]) -> list[int]:

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Poses that the rig plays so that shape keys can be fitted to them: every slider alone on its way, a few, many, and
-expressions as artists compose them."""
+"""Poses that the rig plays so that shape keys can be fitted to them: every slider alone on its way, a few, many,
+expressions as artists compose them, and eyes looking anywhere under lids anywhere."""
 
 import numpy as np
 
@@ -12,17 +12,20 @@ from .actor import Actor
 from .mixtures import SIGNED, composed_pose, mixed_pose
 from .quantities import sliders
 
-#: How far each slider is moved alone, besides 1; how many poses of a few sliders, of many, and composed ones.
+#: How far each slider is moved alone, besides 1; how many poses of a few sliders, of many, composed ones, and looks.
 _WAY = (0.08, 0.25, 0.5, 0.75, -0.3, -0.65, -1.0)
-_FEW, _MANY, _COMPOSED = 700, 400, 1500
+_FEW, _MANY, _COMPOSED, _LOOKS = 700, 400, 1500, 200
 #: Every so many of these, all muscles at once.
 _CROWD = 4
+#: How often both lids of a look are wholly shut or open.
+_SHUT = 0.3
 
 
 def played_poses(
-    actor: Actor, rng: np.random.Generator, few: int = _FEW, many: int = _MANY, composed: int = _COMPOSED
+    actor: Actor, rng: np.random.Generator, few=_FEW, many=_MANY, composed=_COMPOSED, looks=_LOOKS
 ) -> list[dict[str, float]]:
-    """Channel values of each pose: every slider alone at 1, then on its way, then mixtures, then composed expressions."""
+    """Channel values of each pose: every slider alone at 1, then on its way, then mixtures, composed expressions and looks;
+    so many of each."""
     names = sliders(actor.rig)
     poses = [{name: 1.0} for name in names]
     poses += [{name: value} for name in names for value in _WAY if value > 0 or name in SIGNED]
@@ -36,7 +39,14 @@ def played_poses(
         pose |= mixed_pose(actor.muscle_names, rng).values()
         jaw = [name for name in actor.muscle_names if base_name(name) in JAW_MUSCLES]
         poses.append(pose | _some(jaw, rng.integers(0, 3), rng))
-    return poses + [composed_pose(actor.muscle_names, rng).values() for _ in range(composed)]
+    poses += [composed_pose(actor.muscle_names, rng).values() for _ in range(composed)]
+    return poses + [_look(rng) for _ in range(looks)]
+
+
+def _look(rng: np.random.Generator) -> dict[str, float]:
+    pose = {"gaze_x": rng.uniform(-1, 1), "gaze_z": rng.uniform(-1, 1)}
+    lids = [rng.integers(2)] * 2 if rng.uniform() < _SHUT else rng.uniform(size=2)
+    return pose | {"blink_l": float(lids[0]), "blink_r": float(lids[1])}
 
 
 def _some(names, count: int, rng: np.random.Generator) -> dict[str, float]:
