@@ -4,7 +4,10 @@
     python benchmarks/response.py [--care normal] [--unseen 12]
 
 Errors are against the converged simulation (contacts and all) on poses that were no samples: one, three or all muscles
-at random, the same with the jaw anywhere in its range, all expressions and all ARKit shapes.
+at random, the same with the jaw anywhere in its range, ARKit shapes on top of each other, poses between two expressions,
+all expressions and all ARKit shapes; of the rig and of the shape keys that are baked from it. Mixtures that the rig is
+learnt from are composed of rows of the same tables, but hold none of them as it stands there. Eyeballs: how deep the drawn
+lids sink into them, beyond rest, in the ARKit shapes and in looks to all sides under lids that close.
 Prints a table and, on the last line, the same as JSON.
 """
 
@@ -14,10 +17,17 @@ import time
 
 import numpy as np
 
-from headshop.sim.acting.pose import control
+from headshop.sim.acting import arkit
+from headshop.sim.acting.expressions import for_head
+from headshop.sim.acting.pose import Pose, control
 from headshop.sim.anatomy.storage import load_head
+from headshop.sim.mesh_subdivision import smoother
 from headshop.sim.progress import finish
-from headshop.sim.response import accuracy, fit, mirror, sampling, storage
+from headshop.sim.response import accuracy, fit, keys, mirror, playing, sampling, storage
+from headshop.sim.response.actor import actor_of
+from headshop.sim.response.mixtures import SIGNED
+from headshop.sim.response.quantities import sliders
+from headshop.sim.tissue.eye_surface import eyeball_radius
 from headshop.sim.tissue.model import build_model
 from headshop.sim.tissue.solver import solve
 
@@ -38,15 +48,48 @@ def speed(rig, model, poses) -> dict:
     solver, _ = _clock(lambda k: solve(model, asked[k]), min(len(asked), 8))
     rig.skin(asked[0])
     median, least = _clock(lambda k: rig.skin(asked[k % len(asked)]), 400)
+    used = time.process_time()
+    for k in range(400):
+        rig.skin(asked[k % len(asked)])
+    used = time.process_time() - used
     rows = np.array([rig.inputs(each) for each in asked])[np.arange(50) % len(asked)]
     many, _ = _clock(lambda k: rig.own(rows), 10)
     return {
         "solve_ms": 1e3 * solver,
         "pose_ms": 1e3 * median,
         "pose_ms_least": 1e3 * least,
+        "pose_cpu_ms": 1e3 * used / 400,
         "poses_per_s": 1 / median,
         "poses_per_s_batch": 50 / many,
     }
+
+
+def baked(rig, head):
+    """The `Keys` of a rig, as a bake chooses them, of the skin alone."""
+    actor = actor_of(rig, head)
+    poses = playing.played_poses(actor, np.random.default_rng(0))
+    played = finish(playing.played_parts(actor, poses))
+    lowest = {name: -1.0 if name in SIGNED else 0.0 for name in sliders(rig)}
+    return finish(keys.chosen_keys(rig, poses, {"skin": played["skin"]}, lowest, head.eyes))
+
+
+def sunk(model, head, poses, play) -> dict:
+    """mm that the drawn lids are at most within an eyeball beyond rest, and in how many poses more than 0.1."""
+    rows, _ = smoother(head.skin.faces, model.count, 2)
+    rest = control(model, Pose())
+
+    def depths(pose, asked):
+        skin = rows @ play(pose, asked)
+        out = []
+        for lids in model.lids:
+            away = np.linalg.norm(skin - lids.eye.centre, axis=1)
+            depth = eyeball_radius(lids, skin, asked.gaze_of(lids.side)) - away
+            out.append(np.where(away < lids.eye.radius + 3, depth, -1.0))
+        return np.array(out)
+
+    before = np.maximum(depths(Pose(), rest), 0)
+    deepest = np.array([(depths(pose, control(model, pose)) - before).max() for pose in poses])
+    return {"poses": len(poses), "max_mm": float(deepest.max()), "over": int((deepest > 0.1).sum())}
 
 
 def main():
@@ -70,13 +113,28 @@ def main():
     unseen = accuracy.unseen_poses(names, "all_jaw", 20, np.random.default_rng(99))
     quick = speed(rig, model, unseen)
     print("  ".join(f"{name} {value:.2f}" for name, value in quick.items()))
-    found = finish(accuracy.measured(rig, model, count=options.unseen))
-    print(f"{'unseen poses':<14}{'poses':>6}{'rms':>8}{'median':>8}{'worst':>8}{'95 %':>8}{'max mm':>8}")
+    used = time.process_time()
+    shapes = baked(rig, head)
+    counts = {"sliders": len(shapes.sliders), "driven": len(shapes.parts["skin"].driven)}
+    print(f"shape keys chosen in {time.process_time() - used:.0f} s CPU: {counts}")
+    found = finish(accuracy.measured(rig, model, count=options.unseen, seed=2, keys=shapes))
+    print(
+        f"{'unseen poses':<14}{'poses':>6}{'rms':>8}{'median':>8}{'worst':>8}{'95 %':>8}{'max mm':>8}   and of shape keys"
+    )
     for kind, row in found.items():
         numbers = ("rms_mm", "median_pose_rms_mm", "worst_pose_rms_mm", "p95_mm", "max_mm")
-        print(f"{kind:<14}{row['poses']:6d}" + "".join(f"{row[name]:8.3f}" for name in numbers))
+        both = [each[name] for each in (row, row["keys"]) for name in numbers]
+        print(f"{kind:<14}{row['poses']:6d}" + "".join(f"{value:8.3f}" for value in both))
+    looks = [(x, z, shut) for x in (-1, -0.5, 0, 0.5, 1) for z in (-1, 0, 1) for shut in (0, 0.5, 1)]
+    places = {"arkit": [for_head(pose, names) for pose in arkit.poses().values()]}
+    places["looks"] = [Pose(gaze_x=x, gaze_z=z, blink_l=shut, blink_r=shut) for x, z, shut in looks]
+    eyeballs = {}
+    for label, play in zip(("rig", "keys"), accuracy.plays_of(rig, shapes), strict=True):
+        eyeballs[label] = {kind: sunk(model, head, each, play) for kind, each in places.items()}
+    print(f"eyeballs: {eyeballs}")
     report = {"care": options.care, "samples": len(poses), "sampling_s": sampled, "sampling_cpu_s": cpu}
-    print(json.dumps(report | {"fit_cpu_s": fitted, "size_mb": size, "speed": quick, "unseen": found}))
+    report |= {"fit_cpu_s": fitted, "size_mb": size, "speed": quick, "keys": counts}
+    print(json.dumps(report | {"unseen": found, "eyeballs": eyeballs}))
 
 
 if __name__ == "__main__":

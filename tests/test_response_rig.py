@@ -8,7 +8,7 @@ from headshop.sim.acting.pose import Pose, control
 from headshop.sim.errors import InputError
 from headshop.sim.progress import finish
 from headshop.sim.response import actor, fit, mirror, mixtures, sampling, storage
-from headshop.sim.response.accuracy import errors, summary
+from headshop.sim.response.accuracy import errors, plays_of, summary
 from headshop.sim.response.inputs import input_names, inputs_of
 from headshop.sim.response.jaw_frame import JawFrame
 from headshop.sim.response.spending import Spending, fit_spending
@@ -85,7 +85,7 @@ def patch(flat_patch):
 def test_unseen_contractions_of_a_patch(patch):
     head, model, rig, _ = patch
     unseen = [Pose({MUSCLE: value}) for value in (0.15, 0.43, 0.7)]
-    off = finish(errors(rig, model, unseen))
+    (off,) = finish(errors(model, unseen, *plays_of(rig)))
     moved = solve(model, control(model, unseen[-1])).state.skin - head.skin.vertices
     assert np.abs(moved).max() > 5  # it was not rest that was learnt
     assert summary(off)["rms_mm"] < 0.02 and summary(off)["max_mm"] < 0.2, summary(off)

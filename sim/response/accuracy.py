@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How far a rig is from the simulation on poses that it has never seen."""
+"""How far a rig and its shape keys are from the simulation on poses that they have never seen."""
 
 import numpy as np
 
@@ -9,6 +9,8 @@ from ..progress import Progress, Work, portion
 from ..tissue.muscle_field import JAW_MUSCLES, base_name
 from ..tissue.solver import solve
 from ..tissue.structures import Model
+from .keys import Keys
+from .mixtures import within
 from .rig import Rig
 
 #: The simulation counts as converged with steps under this, mm, or after so many of them.
@@ -45,18 +47,27 @@ def _overlaid(rows, kind, rng) -> Pose:
     for k, weight in zip(chosen, share, strict=True):
         for name, value in rows[k].values().items():
             total[name] = total.get(name, 0.0) + weight * value
-    return pose_from(total)
+    return within(total)
 
 
-def errors(rig: Rig, model: Model, poses) -> Work:
-    """(f, n) mm between the rig's skin and the converged simulation's in each pose."""
-    out = np.empty((len(poses), model.count))
+def errors(model: Model, poses, *plays) -> Work:
+    """(len(plays), f, n) mm between the skin that each of ``plays`` makes of a pose and its control, (n, 3) mm, and the
+    converged simulation's."""
+    out = np.empty((len(plays), len(poses), model.count))
     for number, pose in enumerate(poses):
         yield Progress(number / len(poses), f"Simulating unseen pose {number + 1} of {len(poses)}")
         asked = control(model, pose)
         truth = solve(model, asked, max_iterations=ITERATIONS, tolerance=TOLERANCE).state.skin
-        out[number] = np.linalg.norm(rig.skin(asked) - truth, axis=1)
+        out[:, number] = [np.linalg.norm(play(pose, asked) - truth, axis=1) for play in plays]
     return out
+
+
+def plays_of(rig: Rig, keys: Keys | None = None):
+    """What `errors` compares: the rig, and its shape keys if there are any."""
+    found = [lambda pose, asked: rig.skin(asked)]
+    if keys is not None:
+        found.append(lambda pose, asked: rig.frame.rest + keys.displacement("skin", pose.values()))
+    return found
 
 
 def summary(off: np.ndarray) -> dict[str, float]:
@@ -72,11 +83,20 @@ def summary(off: np.ndarray) -> dict[str, float]:
     return {"poses": len(off), **{name: round(float(value), 4) for name, value in found.items()}}
 
 
-def measured(rig: Rig, model: Model, kinds=(*KINDS, "expressions", "arkit"), count: int = 8, seed: int = 1) -> Work:
-    """Kind of pose -> `summary`; ``count`` poses of every kind that is drawn at random, none of them a sample."""
+def measured(
+    rig: Rig,
+    model: Model,
+    kinds=(*KINDS, "expressions", "arkit"),
+    count: int = 8,
+    seed: int = 1,
+    keys: Keys | None = None,
+) -> Work:
+    """Kind of pose -> `summary` of the rig, with that of its shape keys as ``keys`` if they are given; ``count`` poses of
+    every kind that is drawn at random, none of them a sample."""
     report = {}
     for number, kind in enumerate(kinds):
         poses = unseen_poses(model.muscle_names, kind, count, np.random.default_rng([seed, number]))
-        off = yield from portion(errors(rig, model, poses), number / len(kinds), (number + 1) / len(kinds))
-        report[kind] = summary(off)
+        start, stop = number / len(kinds), (number + 1) / len(kinds)
+        off = yield from portion(errors(model, poses, *plays_of(rig, keys)), start, stop)
+        report[kind] = summary(off[0]) | ({"keys": summary(off[1])} if keys else {})
     return report

@@ -60,7 +60,7 @@ def mixed_pose(muscle_names, rng: np.random.Generator) -> Pose:
     if rng.uniform() < _ALIKE:
         values = {name: value for name, value in values.items() if not name.endswith("_r")}
         values |= {name[:-2] + "_r": value for name, value in values.items() if name.endswith("_l")}
-    return _within(values)
+    return within(values)
 
 
 def composed_pose(muscle_names, rng: np.random.Generator) -> Pose:
@@ -79,10 +79,11 @@ def composed_pose(muscle_names, rng: np.random.Generator) -> Pose:
     for name, often in _BESIDES.items():
         if rng.uniform() < often:
             values[name] = values.get(name, 0.0) + rng.uniform(-1 if name in SIGNED else 0, 1)
-    return _within(values)
+    return within(values)
 
 
-def _within(values: dict[str, float]) -> Pose:
+def within(values: dict[str, float]) -> Pose:
+    """The pose of these channels, each kept within its range."""
     return pose_from({name: np.clip(value, -1 if name in SIGNED else 0, 1) for name, value in values.items()})
 
 
