@@ -12,8 +12,9 @@ from ..adapt.smooth_system import factorised
 NEAR, FAR = 10.0, 32.0
 HOLD = 1.0  # pull toward where it was, of skin that hardly gives way
 MEET = 200.0  # pull of a pair of points on each other
-#: Pull of lips toward where they were, as they get the reference's roundness back, and of skin this far from them, mm.
-KEEP, KEPT, BEYOND = 0.01, 30.0, 7.0
+#: Pull of lips toward where they were, as they get the reference's roundness back, and of skin this far from where they
+#: meet, mm: the scan shows how high the red is, but not the roundness of what was stretched.
+KEEP, KEPT, BEYOND = 0.003, 30.0, 9.0
 
 
 def lips_closed(rest: Rest, skin, matrix) -> np.ndarray:
@@ -34,10 +35,10 @@ def lips_rounded(rest: Rest, skin, matrix) -> np.ndarray:
 
     matrix (3, 3) as in `lips_closed`; the lips keep meeting.
     """
-    base = rest.head.skin.vertices @ matrix.T
+    start = rest.head.skin.vertices
+    base = start @ matrix.T
     apart, want = pairs_apart(rest, matrix)
-    lips = np.maximum(rest.head.groups["lip_upper"], rest.head.groups["lip_lower"]) > 0.3
-    away = cKDTree(rest.head.skin.vertices[lips]).query(rest.head.skin.vertices)[0]
+    away = cKDTree(start[rest.lip_pairs.ravel()]).query(start)[0]
     keep = KEEP * (KEPT / KEEP) ** np.clip(away / BEYOND, 0, 1)
     system = rest.energy + diags(keep) + MEET * (apart.T @ apart)
     right = keep[:, None] * (skin - base) + MEET * (apart.T @ (want - apart @ base))

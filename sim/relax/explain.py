@@ -8,14 +8,15 @@ Points of a face, laid on the reference by what expressions do not move, differ 
 
 ``K`` is the covariance of neutral people (`people`), ``K_e``, that of `unlike`, is large only where ``E a`` is. The
 contractions are those of generalised least squares with shrinkage, the rest is the mean of a Gaussian process given the
-data (Rasmussen and Williams 2006, equations 2.25 and 2.42).
+data (Rasmussen and Williams 2006, equations 2.25 and 2.42). What is known of an expression, and of no person, is data without
+a ``d`` (`Told`).
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve, solve_triangular
-from scipy.sparse import diags
+from scipy.sparse import csr_matrix, diags, vstack
 
 from ..acting.expressions import expressions
 from ..anatomy.head import Jaw
@@ -40,8 +41,18 @@ class Expression:
     modelled: np.ndarray
 
 
+@dataclass(frozen=True, eq=False)
+class Told:
+    """rows (k, n) sparse, moves (k, 3) mm and deviations (k, 3) mm: how far an expression is known to move points of the
+    skin that the rows give."""
+
+    rows: csr_matrix
+    moves: np.ndarray
+    deviations: np.ndarray
+
+
 def explain(
-    table: Responses, vertices, jaw: Jaw, sampling, offsets, people, noise, names=None, still=None
+    table: Responses, vertices, jaw: Jaw, sampling, offsets, people, noise, names=None, still=None, told=None
 ) -> Expression:
     """The `Expression` of a face.
 
@@ -56,6 +67,7 @@ def explain(
     noise : mm, one, (k,) or (k, 3), by which points may be wrong
     names : the muscles to consider (all of the table by default)
     still : (k,) bool, points that are known as they are without any expression (None: none)
+    told : `Told`, what else is known of the expression (None: nothing)
     """
     from scipy.optimize import nnls  # slow to load, and few scans have an open mouth
 
@@ -65,6 +77,10 @@ def explain(
     noise = np.asarray(noise, dtype=float)
     noise = np.broadcast_to(noise[:, None] if noise.ndim == 1 else noise, (len(offsets), 3)).ravel()
     rows = sampling if still is None else diags((~np.asarray(still)).astype(float)) @ sampling
+    if told is not None:
+        rows = vstack([rows, told.rows]).tocsr()
+        y, noise = np.append(y, told.moves), np.append(noise, told.deviations)
+        people = np.pad(people, (0, told.moves.size))
     sampled = np.stack([(rows @ field).ravel() for field in fields], axis=1)
     shrink = shrinkage([table.names[k] for k in pick])
     opening, contraction = 0.2, np.full(len(pick), 0.3)

@@ -11,7 +11,7 @@ from scipy.spatial.distance import cdist
 from ..scan.individual import variation
 
 #: Differences beyond the norms: reach in mm, deviation in mm along each axis.
-BEYOND = ((45.0, 0.8), (18.0, 0.6))
+BEYOND = ((45.0, 1.6), (18.0, 1.2))
 
 
 def covariance(landmarks, points, still) -> np.ndarray:

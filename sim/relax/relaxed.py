@@ -3,8 +3,8 @@
 
 Lee, Terzopoulos and Waters 1995, section 2.3, put the lips of the closed mouth in place of the open one's and keep the
 range of the data. Here the whole expression is taken away: what jaw and muscles do on the reference (`responses`)
-explains how the face differs from neutral people (`explain`); that is subtracted, and the lips are laid on each other.
-All else stays as scanned, down to its detail.
+explains how the face differs from neutral people (`explain`), and if that smiles, what is known of smiles is heeded
+(`smile`); it is subtracted, and the lips are laid on each other. All else stays as scanned, down to its detail.
 """
 
 from dataclasses import dataclass
@@ -17,12 +17,13 @@ from ..adapt.rest import rest_of
 from ..adapt.skin_fit import landmark_rows
 from ..adapt.thin_plate_spline import similarity
 from ..anatomy.head import Head
-from ..mesh_subdivision import drawn
+from ..mesh_subdivision import smoother
 from .close_lips import lips_closed, lips_rounded
 from .explain import explain
 from .parted import answers
 from .people import covariance
 from .responses import responses
+from .smile import smiles, told_of_smile
 from .upper_teeth import TOLD, told_of_stomion
 
 #: Skin that the muscles and jaw move by less holds the face in place, mm; of it, points this far apart are looked at.
@@ -30,8 +31,9 @@ UNMOVED, COARSE = 0.25, 30.0
 ROUND = 16.0  # mm between the points that are looked at on the cheeks
 NOISE = 1.0  # mm by which a landmark may be wrong
 UNSURE = 0.02  # trust in skin without data, of 1
-#: Muscles that press the lips or pull them down: a person's own chin looks too much like what they do.
-NO_SMILE = ("mentalis", "platysma", "depressor_anguli_oris", "orbicularis_oris_lower")
+#: Muscles that press the lips or pull them down: a person's own chin looks too much like what they do; and what purses lips.
+CHIN = ("mentalis", "platysma", "depressor_anguli_oris", "orbicularis_oris_lower")
+NO_SMILE = (*CHIN, "orbicularis_oris_upper")
 #: Landmarks that no expression moves much and that hair may hide; the middle of the mouth lies on no lip.
 LEFT_OUT = ("sto", "v", "op", "tr", *(f"{m}_{s}" for m in "go sa sba pra pa obs obi".split() for s in "lr"))
 
@@ -60,7 +62,8 @@ def relaxed(reference: Head, skin, fitted, unseen=None, teeth=()) -> Relaxed:
         raise ValueError("the table of responses belongs to another reference head")
     rest, table = rest_of(reference), responses()
     n = len(skin)
-    start, now = (drawn(reference.skin.faces, cage) for cage in (reference.skin.vertices, skin))
+    as_drawn = smoother(reference.skin.faces, n)[0][:n]
+    start, now = (as_drawn @ cage for cage in (reference.skin.vertices, skin))
     far = unmoved(rest, start, table.reach, unseen)
     still = np.asarray(fitted, dtype=float)[far] + UNSURE
     matrix, shift = similarity(start[far], now[far], still)
@@ -68,21 +71,27 @@ def relaxed(reference: Head, skin, fitted, unseen=None, teeth=()) -> Relaxed:
     rim = rest.lip_rim[::2]
     rim = np.concatenate([rim, cheeks(rest, start)])
     on_rim = csr_matrix((np.ones(len(rim)), (np.arange(len(rim)), rim)), shape=(len(rim), n))
-    sampling = vstack([landmark_rows(reference.landmarks, names, n), on_rim]).tocsr()
+    sampling = vstack([landmark_rows(reference.landmarks, names, n), on_rim])
     back = np.linalg.inv(matrix).T
     offsets = (sampling @ now - shift) @ back - sampling @ start
     noise = np.full(offsets.shape, NOISE)
     meet = told_of_stomion(reference, (np.reshape(teeth, (-1, 3)) - shift) @ back)
     if meet is not None:
-        sampling = vstack([sampling, landmark_rows(reference.landmarks, ["sto"], n)]).tocsr()
+        sampling = vstack([sampling, landmark_rows(reference.landmarks, ["sto"], n)])
         offsets, noise = np.concatenate([offsets, meet[None]]), np.concatenate([noise, [TOLD]])
     known = np.arange(len(offsets)) >= len(names) + len(rim)
     points = np.concatenate([sampling @ start, start[far]])
     weights = np.concatenate([np.zeros(len(offsets)), still])
     people = covariance(reference.landmark_positions(), points, weights)
     people = people[: offsets.size, : offsets.size]
-    muscles = [name for name in table.names if not name.startswith(NO_SMILE)]
-    found = explain(table, start, reference.jaw, sampling, offsets, people, noise, muscles, known)
+    muscles, of_smile = ([name for name in table.names if not name.startswith(left)] for left in (CHIN, NO_SMILE))
+    cage, rows = reference.skin.vertices, (sampling @ as_drawn).tocsr()
+    upper = rest.lip_pairs[rest.rim[rest.lip_pairs].all(axis=1), 0]
+    told = told_of_smile(reference, as_drawn, upper[np.abs(cage[upper, 0]).argmin()])
+    found = explain(table, cage, reference.jaw, rows, offsets, people, noise, muscles, known)
+    smiling = smiles(told, table, found)
+    if smiling:
+        found = explain(table, cage, reference.jaw, rows, offsets, people, noise, of_smile, known, told)
     out = skin - found.displacement @ matrix.T
     gap = lip_gap(rest, skin)
     out = lips_rounded(rest, lips_closed(rest, out, matrix), matrix)
@@ -90,6 +99,7 @@ def relaxed(reference: Head, skin, fitted, unseen=None, teeth=()) -> Relaxed:
     strongest = sorted(found.muscles, key=lambda name: (-found.muscles[name], name))
     report = {
         "jaw_degrees": float(np.degrees(found.jaw * reference.jaw.open_max)),
+        "smiles": smiling,
         "muscles": {name: round(found.muscles[name], 3) for name in strongest if found.muscles[name] >= 0.05},
         "lips_apart_mm": gap,
         "upper_teeth_seen": meet is not None,

@@ -16,7 +16,7 @@ from ..tissue.jaw import jaw_transform
 from .responses import Responses
 
 #: Deviation as a share of what our muscles do: to any side, and more or less of the same.
-ASIDE, ALONG = 0.6, 0.6
+ASIDE, ALONG = 0.4, 0.4
 RIGID = 0.15  # the same of what follows the jaw as a whole
 #: Its reaches in mm with their shares of the variance.
 REACHES = ((16.0, 0.5), (6.0, 0.5))

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..adapt.closest import Surface
 from ..anatomy.head import Head
-from .mouth_gap import MARKS, SPECK, STEP, STEPS, profiles
+from .mouth_gap import EATEN, MARKS, SPECK, STEP, STEPS, profiles
 
 SHARES = np.linspace(-0.3, 0.3, 25)  # of the way from the middle of the mouth to its corners: incisors
 FEWEST = 8  # lines with an edge
@@ -35,7 +35,8 @@ def incisal_edge(target: Surface, given, forward) -> np.ndarray:
     for line, behind in zip(lines, depth, strict=True):
         at = end_of_teeth(behind, np.linalg.norm(line[-1] - line[0]) / (STEPS - 1))
         if at is not None:
-            out.append(line[at] - behind[at] * forward)
+            down = (line[-1] - line[0]) / np.linalg.norm(line[-1] - line[0])
+            out.append(line[at] - behind[at] * forward + EATEN * np.isnan(behind[at + 1]) * down)
     return np.array(out) if len(out) >= FEWEST else np.zeros((0, 3))
 
 
