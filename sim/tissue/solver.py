@@ -12,10 +12,13 @@ from scipy.sparse.linalg import splu
 from .clearing import cleared
 from .curvature import Curvature
 from .diagnostics import diagnose
+from .dissection import Dissection, parted
 from .energy import find_contacts, pose_of
 from .forces import Landscape
 from .structures import Control, Model, Solution, State
 
+#: Free nodes up to which dense blocks are faster than sparse triangles.
+LARGEST = 6000
 #: Steps after which contacts are looked for again: ever more seldom, so that the last planes are solved to the end.
 _REFRESH = frozenset((4, 8, 13, 19, 27, 38, 53, 75, 105, 150))
 
@@ -96,20 +99,25 @@ def _reference_of(model, bones):
 
 
 def factorised(model: Model, dt: float | None = None):
-    """LU of the solver matrix, with inertia and damping for a time step; the last few are kept."""
+    """The solver matrix, with inertia and damping for a time step, ready to ``solve``; the last few are kept."""
     kept = model.cache.setdefault("factors", {})
     if dt not in kept:
-        matrix = model.cache["matrix"]["system"]
+        fixed = model.cache["matrix"]
+        matrix, free = fixed["system"], fixed["free"]
         if dt is not None:
-            free = model.cache["matrix"]["free"]
             p = model.parameters
             inertia = model.mass[free] * (1 / dt**2 + p.damping_rate / dt)
             matrix = matrix + sparse.diags(inertia / p.dynamic_scale)
         while len(kept) > 3:
             kept.pop(next(iter(kept)))
-        kept[dt] = splu(
-            matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}, diag_pivot_thresh=0.0
-        )
+        if len(free) > LARGEST:
+            kept[dt] = splu(
+                matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}, diag_pivot_thresh=0.0
+            )
+        else:
+            if "parts" not in fixed:
+                fixed["parts"] = parted(matrix, model.layers.nodes[free])
+            kept[dt] = Dissection(matrix, *fixed["parts"])
     return kept[dt]
 
 
