@@ -5,9 +5,10 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from headshop.sim.acting.arkit import poses
-from headshop.sim.acting.pose import Pose, control, pose_from
+from headshop.sim.acting.arkit import over, poses
+from headshop.sim.acting.pose import Pose, combined, control, pose_from
 from headshop.sim.anatomy.inside import inside
+from headshop.sim.health.penetration import NAMES, Ruler
 from headshop.sim.mesh import Mesh, vertex_normals
 from headshop.sim.mesh_subdivision import limit, smoother, subdivision
 from headshop.sim.tissue.clearing import PAIRS, cleared, surfaces_of
@@ -22,6 +23,14 @@ from headshop.sim.tissue.solids import build_solid
 from headshop.sim.tissue.solver import rest_state, solve
 
 SHOWN = ("eyeBlinkLeft", "mouthRollUpper", "mouthClose", "noseSneerLeft")
+#: Where bone went through the floor of the mouth, lips past each other, their corners and the last molar into each other.
+WORST = (
+    ("jawOpen", "mouthClose"),
+    ("mouthPucker", "mouthRollLower"),
+    ("jawLeft", "mouthRollUpper"),
+    ("jawForward", "jawRight"),
+    ("mouthClose", "mouthPressLeft"),
+)
 
 
 @pytest.fixture(scope="module")
@@ -74,6 +83,19 @@ def test_a_solid_knows_inside_from_outside_and_no_way_out_within():
     np.testing.assert_allclose(normal[[0, 3]], [[0, 0, 1], [1, 0, 0]], atol=1e-9)
 
 
+def test_gum_in_the_neck_of_a_tooth_is_no_way_out():
+    tooth, faces = _box(-5, 5)
+    gum = tooth * [0.96, 0.96, 1] + [0, 0, -6.0]
+    kind = np.repeat([0, 1], len(faces)).astype(np.int16)
+    mesh = Mesh(np.concatenate([tooth, gum]), np.concatenate([faces, faces + 8]).astype(np.int32), material=kind)
+    solid = build_solid(mesh, False, np.concatenate([tooth, gum]))
+    of_gum = solid.points[solid.material == 1]
+    assert len(of_gum) and of_gum[:, 2].max() < -4.9
+    _, normal, height, material = solid.planes(np.array([[4.9, 0, 0]]), np.eye(3), np.zeros(3))
+    np.testing.assert_allclose(normal, [[1, 0, 0]], atol=1e-9)
+    assert height == pytest.approx([-0.1], abs=1e-6) and material.tolist() == [0]
+
+
 def test_nothing_touches_at_rest(reference_model):
     x = rest_state(reference_model).positions
     pose = pose_of(reference_model, control(reference_model, Pose()))
@@ -82,11 +104,64 @@ def test_nothing_touches_at_rest(reference_model):
     np.testing.assert_array_equal(cleared(reference_model, pose, x), x)
 
 
+@pytest.fixture(scope="module")
+def ruler(reference, reference_model):
+    return Ruler(reference, reference_model, pose_of(reference_model, control(reference_model, Pose())))
+
+
 @pytest.mark.parametrize("name", SHOWN)
-def test_poses_come_out_clear(solved, name):
+def test_poses_tell_that_they_came_out_clear(solved, name):
     found = solved[name].diagnostics
     assert found["penetration_of"].keys() == set(PAIRS)
     assert max(found["penetration_of"].values()) == found["penetration_mm"] < 0.1
+
+
+@pytest.mark.parametrize("pair", WORST, ids="+".join)
+def test_poses_come_out_clear(reference_model, ruler, pair):
+    """As the meshes themselves tell it, not the solver's own points and planes."""
+    shapes = poses()
+    one, other = (combined(shapes[name], shapes[over()[name]]) if name in over() else shapes[name] for name in pair)
+    asked = control(reference_model, combined(one, other))
+    solution = solve(reference_model, asked, max_iterations=200)
+    depth = ruler(solution.state.positions, pose_of(reference_model, asked))
+    assert depth.keys() == set(NAMES) and max(depth.values()) < 0.1
+    assert solution.converged and solution.diagnostics["penetration_mm"] < 0.1
+
+
+def test_the_ruler_sees_what_is_in_what(reference, reference_model, ruler):
+    n = reference_model.count
+    rest = rest_state(reference_model).positions
+    pose = pose_of(reference_model, control(reference_model, Pose()))
+    assert max(ruler(rest, pose).values()) < 1e-6
+
+    def moved(rows, by):
+        x = rest.copy()
+        x[rows] += by
+        return ruler(x, pose)
+
+    lids = reference_model.lids[0]
+    away = rest[lids.column] - lids.eye.centre
+    found = moved(lids.column, -0.5 * away / np.linalg.norm(away, axis=1, keepdims=True))
+    assert 0.3 < found["lid_eyeball"] < 0.6 and found["lip_lip"] < 1e-6
+    upper, lower = (np.asarray(reference.groups[name]) > 0.3 for name in ("lip_upper", "lip_lower"))
+    found = moved(np.flatnonzero(lower & ~upper), [0, 0, 0.6])
+    assert 0.3 < found["lip_lip"] < 0.61
+    assert moved(np.flatnonzero(upper | lower), [0, 4.0, 0])["skin_teeth"] > 0.5
+    on_bone = np.flatnonzero(reference_model.layers.bony)
+    assert moved(n + on_bone, 1.2 * (rest[2 * n + on_bone] - rest[n + on_bone]))["fascia_skull"] > 0.5
+
+
+def test_normals_are_those_of_what_is_drawn(reference, solved):
+    skin, faces = solved["mouthRollUpper"].state.skin, reference.skin.faces
+    samples = drawn_samples(faces, reference.skin.vertices, np.asarray(reference.groups["lip_upper"]) > 0.5, fans=True)
+    rows, quads = smoother(faces, len(skin), 2)
+    fine = rows @ skin
+    normals = vertex_normals(fine, np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]))
+    some = samples[samples.at(skin)[:, 0] > 0]
+    at = some.at(skin)
+    away, near = cKDTree(fine).query(at)
+    agree = np.einsum("ij,ij->i", some.fan.normals(at, skin), normals[near])
+    assert len(at) > 100 and away.max() < 0.05 and np.median(agree) > 0.999 and (agree > 0.9).mean() > 0.98
 
 
 def test_volume_is_told_by_region(reference_model, solved):

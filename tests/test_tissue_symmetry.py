@@ -24,7 +24,9 @@ def mate(reference_model):
 
 
 def _solved(reference_model, channels):
-    return solve(reference_model, control(reference_model, pose_from(channels)), max_iterations=200).state.skin
+    # to the end: a descent that stops early stops elsewhere on either side by chance of rounding
+    asked = control(reference_model, pose_from(channels))
+    return solve(reference_model, asked, max_iterations=200, tolerance=2e-3).state.skin
 
 
 def _farthest(reference_model, mate, channels):

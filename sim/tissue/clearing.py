@@ -9,7 +9,8 @@ least motion of the vertices that does it.
 import numpy as np
 
 from ..mesh import vertex_normals
-from .drawn_contact import eye_contacts, lip_contacts
+from .drawn_contact import eye_contacts
+from .drawn_lips import lip_contacts
 from .drawn_samples import planes_of
 from .flesh import flesh_contacts
 from .lid_meeting import met

@@ -8,7 +8,7 @@ exactly the scan. Our own model takes bone and lining from here, and looks for t
 (`drawn_contact`); the other models know vertices only.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -17,18 +17,20 @@ from ..anatomy.head import Head
 from ..mesh import vertex_normals
 from .arch import Arch, build_arches
 from .eye_surface import eyeball_radius
-from .geometry import short_diagonals
+from .geometry import TIE, short_diagonals
 from .layers import Layers
 from .planes import Planes, empty_planes
 
 _LIP_REACH = 6.0
-#: mm from the bone beyond which fascia is not held off it: far more than it moves before bone is looked for again.
-_BONE_REACH = 6.0
+#: mm farther away for which a point of bone makes up by facing the way that a column stands, not 60 degrees off it; mm, of
+#: both together, beyond which fascia is not held off bone: more than it moves before bone is looked for again.
+_FACING, _BONE_REACH = 12.0, 16.0
 
 
 @dataclass(frozen=True, eq=False)
 class Bone:
-    """column (c,) skin columns on this bone, margin (c,) mm their fascia keeps; points, normal (k, 3)."""
+    """column (c,) skin columns on this bone, margin (c,) mm their fascia keeps; points, normal (k, 3); tree of
+    points and normals times `_FACING`."""
 
     column: np.ndarray
     margin: np.ndarray
@@ -36,6 +38,17 @@ class Bone:
     normal: np.ndarray
     tree: cKDTree
     lower: bool
+
+    def under(self, points, stands, reach: float = np.inf):
+        """Which (r,) of ``points`` (c, 3) have bone under them, its place (r, 3) and normal (r, 3) there: near, and facing
+        about as ``stands`` (c, 3), the way the column stands on it; off by no more than ``reach``, both as mm in `_FACING`.
+        So what gets into the bone goes out by the side it came from, not through the bone."""
+        distance, near = self.tree.query(np.concatenate([points, _FACING * stands], axis=1), distance_upper_bound=reach)
+        rows = np.flatnonzero(np.isfinite(distance))
+        at, normal = self.points[near[rows]], self.normal[near[rows]]
+        middle = np.abs(points[rows, 0]) < TIE  # two places are as near, and it is held to neither side
+        at[middle, 0] = normal[middle, 0] = 0
+        return rows, at, normal
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,10 +101,10 @@ def bone_planes(model_bones, layers: Layers, fascia: np.ndarray, rotation, trans
         points = fascia[bone.column]
         if bone.lower:
             points = (points - translation) @ rotation
-        distance, near = bone.tree.query(points, distance_upper_bound=_BONE_REACH)
-        rows = np.flatnonzero(np.isfinite(distance))
-        rows = rows[np.einsum("ij,ij->i", bone.normal[near[rows]], layers.bone_normal[bone.column[rows]]) > 0.5]
-        at, n = bone.points[near[rows]], bone.normal[near[rows]]
+        stands = layers.bone_normal[bone.column]
+        rows, at, n = bone.under(points, stands, _BONE_REACH)
+        keep = np.einsum("ij,ij->i", n, stands[rows]) > 0.5
+        rows, at, n = rows[keep], at[keep], n[keep]
         if bone.lower:
             at, n = at @ rotation.T + translation, n @ rotation.T
         node.append(bone.column[rows] + len(fascia))
@@ -120,11 +133,12 @@ def build_bones(head: Head, layers: Layers) -> tuple[Bone, ...]:
         near = cKDTree(points).query(layers.nodes[2 * n :][column])[1]
         if np.einsum("ij,ij->i", normal[near], layers.bone_normal[column]).mean() < 0:  # wound inside out
             normal = -normal
-        tree = cKDTree(points)
+        tree = cKDTree(np.concatenate([points, _FACING * normal], axis=1))
+        bone = Bone(column, np.zeros(len(column)), points, normal, tree, lower)
         fascia = layers.nodes[n : 2 * n][column]
-        near = tree.query(fascia)[1]
-        gap = np.einsum("ij,ij->i", fascia - points[near], normal[near])
-        bones.append(Bone(column, np.minimum(gap, 0.3), points, normal, tree, lower))
+        _, at, facing = bone.under(fascia, layers.bone_normal[column])
+        gap = np.einsum("ij,ij->i", fascia - at, facing)
+        bones.append(replace(bone, margin=np.minimum(gap, 0.3)))
     return tuple(bones)
 
 

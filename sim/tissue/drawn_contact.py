@@ -5,20 +5,18 @@ Each is a point between nodes against a plane (`planes.Planes`, its rows). As wi
 nearer than it should be at rest may stay so: the neutral face is exactly the scan.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from ..anatomy.head import Head
-from ..mesh import vertex_normals
 from .arch import Arch, wall_planes
+from .drawn_lips import FINE, MANY, Lips, build_lips, lip_contacts
 from .drawn_samples import SPACING, Samples, drawn_samples, planes_of
 from .eye_surface import eyeball_radius
 from .flesh import Flesh, build_flesh
-from .geometry import short_diagonals
 from .gingiva import attached
 from .planes import Planes
 from .solids import Solid, build_solid
@@ -28,15 +26,8 @@ from .structures import Layers, Lids
 CLEAR, REACH = 0.15, 1.2
 #: mm between points of cheeks, lining and lids; skin that far from an eyeball may come to lie on it as the lid is drawn out.
 WIDE, DRAPED = 2.4, 5.0
-#: mm between the points of lips at which what is left of penetration is looked for.
-FINE = 0.8
-#: rad from the front, seen from the axis of a row of teeth, within which there are teeth.
-BESIDE = 1.6
-#: mm from the other lip, at rest, that the surface of a lip is looked at, and by which a lip is at
-#: least thick.
-LIP_DEEP, LIP_THIN = 7.0, 1.0
-#: mm within which two points of the lips may touch, and the gap that is kept between them at most.
-LIP_REACH, LIP_GAP = 3.0, 0.25
+#: mm between the points of lips and lining at which what is left of teeth in them is looked for.
+CLOSE = 1.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,18 +37,6 @@ class Before:
     of: Any
     points: Samples
     clearance: np.ndarray
-
-
-@dataclass(frozen=True, eq=False)
-class Lips:
-    """points on the upper and on the lower lip, ``spacing`` mm apart; their places and normals at rest; least mm (at most
-    0) that they are apart there."""
-
-    points: tuple[Samples, Samples]
-    spacing: float
-    rest: tuple[np.ndarray, np.ndarray]
-    normals: tuple[np.ndarray, np.ndarray]
-    least: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,11 +59,11 @@ def _within(mesh, lower, points, places, spacing) -> Within:
 
 @dataclass(frozen=True, eq=False)
 class DrawnSurfaces:
-    """teeth, eyes: what may touch them; lips: the two, fine_lips: the same more closely; flesh: both faces of lips and cheeks;
-    rigid: part -> mesh of what is solid; nodes (3 n, 3) mm at rest; fascia: bone -> columns over
-    it."""
+    """teeth, eyes: what may touch them; lips: the two; fine_teeth, fine_lips: the same more closely; flesh: both faces of
+    lips and cheeks; rigid: part -> mesh of what is solid; nodes (3 n, 3) mm at rest; fascia: bone -> columns over it."""
 
     teeth: tuple[Before, ...]
+    fine_teeth: tuple[Before, ...]
     eyes: tuple[Before, ...]
     lips: Lips
     fine_lips: Lips
@@ -97,14 +76,17 @@ class DrawnSurfaces:
     def rows_of_teeth(self) -> tuple[Within, ...]:
         """Both rows of teeth with their gums as solids, made when they are first asked for."""
         rest = self.nodes[: len(self.nodes) // 3]
-        out = []
-        for before in self.teeth:
-            # behind the last tooth the lining has grown round the end of the gum
-            points = before.points[np.abs(before.of.coordinates(before.points.at(rest))[0]) < BESIDE]
-            part = "teeth_lower" if before.of.lower else "teeth_upper"
-            if len(points):
-                out.append(_within(self.rigid[part], before.of.lower, points, points.at(rest), 0.5))
-        return tuple(out)
+        return tuple(
+            _within(
+                self.rigid["teeth_lower" if before.of.lower else "teeth_upper"],
+                before.of.lower,
+                before.points,
+                before.points.at(rest),
+                0.5,
+            )
+            for before in self.fine_teeth
+            if len(before.points)
+        )
 
     @cached_property
     def bones(self) -> tuple[Within, ...]:
@@ -123,17 +105,8 @@ def build_drawn(head: Head, layers: Layers, arches: tuple[Arch, ...], lids_of_bo
     free = layers.free[:n]
     group = {k: np.asarray(head.groups.get(k, np.zeros(n)), float) for k in ("lip_upper", "lip_lower", "mouth_bag")}
     mouth = (np.max(list(group.values()), axis=0) > 0.05) & free
-    lining = drawn_samples(faces, skin, mouth, WIDE)
-    points = lining.at(skin)
-    held = lining.rows @ attached(head)[0]
-    teeth = []
-    for arch in arches:
-        far, wall = arch.before(points)
-        # at any height: what stands in front of the row where it is highest is in front of it
-        ahead = arch.crest(points)
-        ahead = (ahead > 0.6 * arch.radius.max()) & (far > ahead - 1.5) & (held < 0.3)
-        gap = np.where(wall > 0, far - wall, np.inf)
-        teeth.append(Before(arch, lining[ahead], np.minimum(gap[ahead], CLEAR)))
+    held = attached(head)[0]
+    teeth, fine_teeth = (_before_teeth(arches, drawn_samples(faces, skin, mouth, k), skin, held) for k in (WIDE, CLOSE))
     eyes = []
     for lids in lids_of_both:
         near = np.zeros(n, bool)
@@ -147,23 +120,25 @@ def build_drawn(head: Head, layers: Layers, arches: tuple[Arch, ...], lids_of_bo
     on_bone = layers.bony & free
     over = {"skull": layers.mandible <= 0.5, "mandible": layers.mandible > 0.5}
     fascia = {k: np.flatnonzero(on_bone & over[k]) for k in over if k in rigid and (on_bone & over[k]).any()}
-    lips = [(group[k] > 0.3) & free for k in ("lip_upper", "lip_lower")]
-    lips = [_lips(faces, skin, lips, spacing) for spacing in (SPACING, FINE)]
+    weights = group["lip_upper"], group["lip_lower"]
+    lips = [build_lips(faces, skin, weights, free, *how) for how in ((SPACING, 1), (FINE, MANY))]
     inside = np.asarray(head.groups.get("inner", np.zeros(n))) > 0.5
     flesh = build_flesh(faces, skin, mouth, inside)
-    return DrawnSurfaces(tuple(teeth), tuple(eyes), *lips, flesh, rigid, layers.nodes, fascia)
+    return DrawnSurfaces(teeth, fine_teeth, tuple(eyes), *lips, flesh, rigid, layers.nodes, fascia)
 
 
-def _lips(faces, skin, groups, spacing) -> Lips:
-    points = [drawn_samples(faces, skin, group, spacing) for group in groups]
-    if all(len(x) for x in points):  # what lies on the far side of a lip never meets the other one
-        places = [x.at(skin) for x in points]
-        far = [cKDTree(places[1 - k]).query(places[k])[0] < LIP_DEEP for k in (0, 1)]
-        points = [x[f] for x, f in zip(points, far, strict=True)]
-    normals = vertex_normals(skin, short_diagonals(skin, faces))
-    lips = Lips(tuple(points), spacing, *_lips_at(points, skin, normals), 0.0)
-    gaps = [gap for *_, gap in _across(lips, lips.rest, lips.normals, 0.0, LIP_REACH)]
-    return replace(lips, least=min((float(gap.min(initial=0.0)) for gap in gaps), default=0.0))
+def _before_teeth(arches, lining: Samples, skin, held) -> tuple[Before, ...]:
+    """Those points of the ``lining`` that are in front of each row of teeth; held (n,): `attached`."""
+    points, free = lining.at(skin), lining.rows @ held < 0.3
+    out = []
+    for arch in arches:
+        far, wall = arch.before(points)
+        # at any height: what stands in front of the row where it is highest is in front of it
+        ahead = arch.crest(points)
+        ahead = (ahead > 0.6 * arch.radius.max()) & (far > ahead - 1.5) & free
+        gap = np.where(wall > 0, far - wall, np.inf)
+        out.append(Before(arch, lining[ahead], np.minimum(gap[ahead], CLEAR)))
+    return tuple(out)
 
 
 def drawn_contacts(surfaces: DrawnSurfaces, skin, normals, rotation, translation, gaze_of) -> Planes:
@@ -215,44 +190,3 @@ def tooth_contacts(before: Before, skin, rotation, translation):
     keep, normal, missing = wall_planes(before.of, points, before.clearance, rotation, translation, REACH)
     level = np.einsum("ij,ij->i", points[keep], normal) + missing
     return *before.points.along(keep, normal), level
-
-
-def lip_contacts(lips: Lips, skin, normals, most: float = LIP_GAP, reach: float = LIP_REACH):
-    """Each point of a lip against the tangent plane of the nearest point of the other, ``most`` mm before it at most; pieces
-    for `planes_of`."""
-    out = []
-    for own, other, which, mate, facing, gap in _across(lips, *_lips_at(lips.points, skin, normals), most, reach):
-        both = lips.points[own].along(which, facing), lips.points[other].along(mate, -facing)
-        column, value = (np.concatenate(pair, axis=1) for pair in zip(*both, strict=True))
-        out.append((column, value, np.maximum(gap, lips.least)))
-    return out
-
-
-def _across(lips: Lips, places, normals, most, reach):
-    """For both lips: its index and the other's, points (c,), those of the other lip across from them (c,), the directions
-    (c, 3) from these to those, and the mm (c,) that they keep."""
-    if min(len(x) for x in lips.points) < 3:
-        return
-    for own, other in ((0, 1), (1, 0)):
-        distance, near = cKDTree(places[other]).query(places[own], distance_upper_bound=reach)
-        which = np.flatnonzero(np.isfinite(distance))
-        mate = near[which]
-        facing = normals[other][mate] - normals[own][which]
-        size = np.einsum("ij,ij->i", facing, facing)
-        facing = _unit(facing)
-        away = places[own][which] - places[other][mate]
-        beside = distance[which] ** 2 - np.einsum("ij,ij->i", away, facing) ** 2
-        before = _unit(lips.normals[other][mate] - lips.normals[own][which])
-        gap = np.einsum("ij,ij->i", lips.rest[own][which] - lips.rest[other][mate], before)
-        # more than 60 degrees between their normals, across from each other, and no flesh between them: round the corner of
-        # the mouth two points may be back to back
-        ok = (size > 1.0) & (beside < lips.spacing**2) & (gap > -LIP_THIN)
-        yield own, other, which[ok], mate[ok], facing[ok], np.minimum(gap[ok], most)
-
-
-def _lips_at(points, skin, normals):
-    return [x.at(skin) for x in points], [_unit(x.at(normals)) for x in points]
-
-
-def _unit(vectors):
-    return vectors / np.maximum(np.sqrt(np.einsum("ij,ij->i", vectors, vectors)), 1e-9)[:, None]

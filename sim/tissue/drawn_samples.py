@@ -6,7 +6,7 @@ lip whose cage clears the teeth can still be drawn through them. So contact is b
 A point of the limit surface is a sum of vertices with fixed weights, so a push on it is a push on each, by its weight.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -22,18 +22,45 @@ WIDTH = 16
 
 
 @dataclass(frozen=True, eq=False)
+class Fan:
+    """What is drawn round points: ``ring`` (r, n) sparse, the points beside them; face f (f,) round point ``owner`` lies
+    between ring points ``ahead`` and ``behind``, counter-clockwise seen from outside."""
+
+    ring: sparse.csr_matrix
+    owner: np.ndarray
+    ahead: np.ndarray
+    behind: np.ndarray
+
+    def __getitem__(self, chosen) -> "Fan":
+        kept = chosen[self.owner]
+        number = np.cumsum(chosen) - 1
+        return Fan(self.ring, number[self.owner[kept]], self.ahead[kept], self.behind[kept])
+
+    def normals(self, points, values) -> np.ndarray:
+        """(k, 3) unit normals at ``points`` (k, 3) of the surface drawn of the vertices ``values`` (n, 3)."""
+        ring, middle = self.ring @ values, points[self.owner]
+        cross = np.cross(ring[self.ahead] - middle, ring[self.behind] - middle)
+        out = np.stack([np.bincount(self.owner, cross[:, axis], len(points)) for axis in range(3)], axis=1)
+        return out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-12)
+
+
+@dataclass(frozen=True, eq=False)
 class Samples:
-    """Points of the drawn surface: rows (k, n) sparse; the same as node (k, w) and weight (k, w), padded with 0."""
+    """Points of the drawn surface: rows (k, n) sparse; the same as node (k, w) and weight (k, w), padded with 0; what is
+    round them, if that was asked for."""
 
     rows: sparse.csr_matrix
     node: np.ndarray
     weight: np.ndarray
+    fan: Fan | None = None
 
     def __len__(self):
         return len(self.node)
 
     def __getitem__(self, chosen) -> "Samples":
-        return Samples(self.rows[chosen], self.node[chosen], self.weight[chosen])
+        """Those ``chosen``; with fans by (k,) bool."""
+        fan = None if self.fan is None else self.fan[chosen]
+        return Samples(self.rows[chosen], self.node[chosen], self.weight[chosen], fan)
 
     def at(self, values) -> np.ndarray:
         """(k, 3) what the vertices' ``values`` (n, 3) are at the points."""
@@ -82,10 +109,13 @@ def planes_of(pieces, n: int) -> Planes:
     return Planes(none.node, none.normal, none.level, none.partner, rows, level)
 
 
-def drawn_samples(faces: np.ndarray, vertices: np.ndarray, chosen: np.ndarray, spacing: float = SPACING):
+def drawn_samples(
+    faces: np.ndarray, vertices: np.ndarray, chosen: np.ndarray, spacing: float = SPACING, fans: bool = False
+) -> Samples:
     """`Samples` (k) of the surface drawn of the faces with a vertex in ``chosen``, about ``spacing`` mm apart.
 
-    faces (m, 4), vertices (n, 3) mm at rest, chosen (n,) bool. First come the chosen vertices' own points.
+    faces (m, 4), vertices (n, 3) mm at rest, chosen (n,) bool; fans: with the `Fan` of the points. First come the chosen
+    vertices' own points.
     """
     n = len(vertices)
     if not chosen.any():
@@ -111,10 +141,26 @@ def drawn_samples(faces: np.ndarray, vertices: np.ndarray, chosen: np.ndarray, s
     cell = np.floor(near).astype(np.int64)
     off = np.round(np.linalg.norm(near - cell - 0.5, axis=1), 5)
     cell[:, 0] = np.where(at[:, 0] < 0, -1 - cell[:, 0], cell[:, 0])
+    cell[near[:, 0] < 1e-6, 0] = cell[:, 0].max(initial=0) + 1  # the plane of symmetry is on neither side
     order = np.lexsort((off, ~corner))
     _, first = np.unique(cell[order], axis=0, return_index=True)
     picked = corner.copy()
     picked[order[first]] = True
     picked = np.concatenate([points[corner], points[picked & ~corner]])
-    rows = rows[picked].tocoo()
-    return samples_of(sparse.csr_matrix((rows.data, (rows.row, keep[rows.col])), (len(picked), n)))
+
+    def of_all(some):
+        some = rows[some].tocoo()
+        return sparse.csr_matrix((some.data, (some.row, keep[some.col])), (some.shape[0], n))
+
+    samples = samples_of(of_all(picked))
+    return replace(samples, fan=_fan_of(quads, picked, of_all)) if fans else samples
+
+
+def _fan_of(quads, picked, rows_of) -> Fan:
+    """The `Fan` of the points ``picked`` (k,) of a mesh of ``quads``; rows_of: points -> their rows."""
+    number = np.full(quads.max() + 1, -1)
+    number[picked] = np.arange(len(picked))
+    face, corner = np.nonzero(number[quads] >= 0)
+    ahead, behind = (quads[face, (corner + step) % 4] for step in (1, 3))
+    ring, place = np.unique(np.concatenate([ahead, behind]), return_inverse=True)
+    return Fan(rows_of(ring), number[quads[face, corner]], *place.reshape(2, -1))

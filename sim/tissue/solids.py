@@ -13,7 +13,7 @@ from scipy.ndimage import binary_closing, binary_dilation, label
 from scipy.spatial import cKDTree
 
 from ..mesh import Mesh
-from .geometry import short_diagonals
+from .geometry import TIE, short_diagonals
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,9 +69,13 @@ def build_solid(mesh: Mesh, lower: bool, about: np.ndarray, spacing: float = 0.5
     wall = np.pad(wall, 2)
     wall = binary_closing(wall, iterations=2)[2:-2, 2:-2, 2:-2]  # crevices are no way in
     space, _ = label(~wall)
-    outside = binary_dilation(space == space[0, 0, 0], iterations=1)
+    outside = space == space[0, 0, 0]
+    outside[tuple(((about - low) / spacing).astype(int).T)] = True  # nor is what is out already in a crevice
+    outside = binary_dilation(outside, iterations=1)
     step = ((np.clip(points + 1.2 * spacing * normal[owner], low, high) - low) / spacing).astype(int)
     seen = outside[tuple(step.T)]
+    points, owner = points[seen], owner[seen]
+    seen = ~_buried(points, normal[owner], kind[owner], spacing)
     points, owner = points[seen], owner[seen]
     near = np.isfinite(cKDTree(about).query(points, distance_upper_bound=8.0)[0])
     points, owner = points[near], owner[near]
@@ -91,3 +95,22 @@ def _covered(tri, spacing):
         points.append(np.einsum("pk,tkx->tpx", weight, tri[which]).reshape(-1, 3))
         owner.append(np.repeat(which, len(weight)))
     return np.concatenate(points), np.concatenate(owner)
+
+
+def _buried(points, normal, kind, spacing):
+    """(k,) bool: which ``points`` (k, 3) lie just behind the side of another ``kind`` (k,), as the gum in a tooth's neck."""
+    out = np.zeros(len(points), bool)
+    for one in np.unique(kind):
+        own, other = np.flatnonzero(kind == one), np.flatnonzero(kind != one)
+        if not len(other):
+            break
+        distance, near = cKDTree(points[other]).query(points[own], 8, distance_upper_bound=2 * spacing)
+        found = np.isfinite(distance[:, 0])
+        own, distance, near = own[found], distance[found], near[found]
+        # on an edge both sides are as near: what is behind one of them only is not behind the edge
+        alike = distance <= distance[:, :1] + TIE
+        near = other[np.where(alike, near, 0)]
+        height = np.einsum("ikj,ikj->ik", points[own, None] - points[near], normal[near])
+        height = np.where(alike, height, -np.inf).max(axis=1)
+        out[own] = (height < -TIE) & (distance[:, 0] ** 2 - height**2 < spacing**2)
+    return out
