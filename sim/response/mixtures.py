@@ -30,6 +30,9 @@ _BEYOND = 1.15
 #: Of a composed pose: how likely each further row is, its strengths, and by how much its channels differ from the table's
 #: (log of a factor) at most.
 _FURTHER, _STRENGTH, _OTHERWISE = 0.55, (0.15, 1.2), 0.5
+#: How often eyes look anywhere under lids anywhere, and both lids are then wholly shut or open: little motion, but an
+#: eyeball shows through lids at once.
+_LOOKS, _SHUT = 0.35, 0.3
 #: How often a composed pose moves these besides.
 _BESIDES = {"jaw_open": 0.4, "jaw_side": 0.15, "jaw_forward": 0.15, "lips_together": 0.15}
 
@@ -57,6 +60,8 @@ def mixed_pose(muscle_names, rng: np.random.Generator) -> Pose:
         if name.startswith(("jaw_open", "lip_")) or rng.uniform() > _OFTEN:
             continue
         values[name] = rng.uniform(-_BEYOND if name in SIGNED else 0.0, _BEYOND)
+    if rng.uniform() < _LOOKS:
+        values |= look(rng)
     if rng.uniform() < _ALIKE:
         values = {name: value for name, value in values.items() if not name.endswith("_r")}
         values |= {name[:-2] + "_r": value for name, value in values.items() if name.endswith("_l")}
@@ -79,7 +84,16 @@ def composed_pose(muscle_names, rng: np.random.Generator) -> Pose:
     for name, often in _BESIDES.items():
         if rng.uniform() < often:
             values[name] = values.get(name, 0.0) + rng.uniform(-1 if name in SIGNED else 0, 1)
+    if rng.uniform() < _LOOKS:
+        values |= look(rng)
     return within(values)
+
+
+def look(rng: np.random.Generator) -> dict[str, float]:
+    """Channels of eyes that look anywhere, each under lids anywhere."""
+    lids = [rng.integers(2)] * 2 if rng.uniform() < _SHUT else rng.uniform(size=2)
+    values = {"blink_l": float(lids[0]), "blink_r": float(lids[1])}
+    return values | {"gaze_x": rng.uniform(-1, 1), "gaze_z": rng.uniform(-1, 1)}
 
 
 def within(values: dict[str, float]) -> Pose:

@@ -9,7 +9,7 @@ from ..progress import Progress, Work
 from ..tissue.muscle_field import JAW_MUSCLES, base_name
 from ..tissue.posing import posed_parts
 from .actor import Actor
-from .mixtures import SIGNED, composed_pose, mixed_pose
+from .mixtures import SIGNED, composed_pose, look, mixed_pose
 from .quantities import sliders
 
 #: How far each slider is moved alone, besides 1; how many poses of a few sliders, of many, composed ones, and looks.
@@ -17,8 +17,6 @@ _WAY = (0.08, 0.25, 0.5, 0.75, -0.3, -0.65, -1.0)
 _FEW, _MANY, _COMPOSED, _LOOKS = 700, 400, 1500, 200
 #: Every so many of these, all muscles at once.
 _CROWD = 4
-#: How often both lids of a look are wholly shut or open.
-_SHUT = 0.3
 
 
 def played_poses(
@@ -40,13 +38,7 @@ def played_poses(
         jaw = [name for name in actor.muscle_names if base_name(name) in JAW_MUSCLES]
         poses.append(pose | _some(jaw, rng.integers(0, 3), rng))
     poses += [composed_pose(actor.muscle_names, rng).values() for _ in range(composed)]
-    return poses + [_look(rng) for _ in range(looks)]
-
-
-def _look(rng: np.random.Generator) -> dict[str, float]:
-    pose = {"gaze_x": rng.uniform(-1, 1), "gaze_z": rng.uniform(-1, 1)}
-    lids = [rng.integers(2)] * 2 if rng.uniform() < _SHUT else rng.uniform(size=2)
-    return pose | {"blink_l": float(lids[0]), "blink_r": float(lids[1])}
+    return poses + [look(rng) for _ in range(looks)]
 
 
 def _some(names, count: int, rng: np.random.Generator) -> dict[str, float]:
