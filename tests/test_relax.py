@@ -31,7 +31,7 @@ from headshop.sim.tissue.solver import solve
 
 SMILE = {
     f"{name}_{side}": value
-    for name, value in {"zygomaticus_major": 0.9, "zygomaticus_minor": 0.4, "risorius": 0.5}.items()
+    for name, value in {"zygomaticus_major": 1.0, "zygomaticus_minor": 0.5, "risorius": 0.6}.items()
     for side in "lr"
 }
 CORNERS = ("ch_l", "ch_r")
@@ -91,7 +91,7 @@ def test_an_open_smile_becomes_neutral(reference, people):
 
 def test_a_broad_smile_is_taken_for_one(reference, people):
     table = responses()
-    pull = {"zygomaticus_major": 1.6, "zygomaticus_minor": 0.5, "risorius": 1.5, "levator_anguli_oris": 0.5}
+    pull = {"zygomaticus_major": 1.1, "zygomaticus_minor": 0.4, "risorius": 1.0, "levator_anguli_oris": 0.4}
     smile = table.jaw_at(0.2) + sum(
         value * table.fields[table.names.index(f"{name}_{side}")] for name, value in pull.items() for side in "lr"
     )

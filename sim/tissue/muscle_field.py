@@ -21,6 +21,11 @@ LID_MUSCLES = ("levator_palpebrae", "orbicularis_oculi_palpebral", "orbicularis_
 #: The two muscles that the orbicularis oris is divided into, each with a centre of contraction that moves on a line.
 LIPS = ("orbicularis_oris_upper", "orbicularis_oris_lower")
 FORWARD = np.array([[0.0, -1.0, 0.0]])
+#: Muscles that meet in the modiolus, beside the corner of the mouth, and go on from there into the skin of both lips (Standring
+#: 2015, Gray's Anatomy: their slips interlace with orbicularis oris).
+MODIOLUS = ("zygomaticus_major", "risorius", "levator_anguli_oris", "depressor_anguli_oris", "buccinator")
+#: Share at which the way beyond their free end counts: their pull reaches the corner.
+_BEYOND = 0.35
 _LIDS = ("upper_l", "upper_r", "lower_l", "lower_r")
 #: Half the width over which a single fibre takes hold of the fascia, mm: about one mesh of the skin and a half.
 _NARROWEST = 7.5
@@ -76,6 +81,8 @@ def _linear(muscle: Muscle, points, normals):
     for fibre in fibres:
         epsilon, omega, deep, toward = fibre_coordinates(points, normals, fibre)
         reach = max(spacing, _NARROWEST) + 0.5 * _NARROWEST
+        if base_name(muscle.name) in MODIOLUS:
+            omega = np.where(epsilon < 1, omega, _BEYOND * omega)
         w = theta_1(epsilon) * theta_2(omega / reach) * (np.abs(deep) < _DEPTH)
         weight = np.maximum(weight, w)
         direction += w[:, None] * toward
