@@ -87,8 +87,9 @@ def relaxed(reference: Head, skin, fitted, unseen=None, teeth=()) -> Relaxed:
     muscles, of_smile = ([name for name in table.names if not name.startswith(left)] for left in (CHIN, NO_SMILE))
     cage, rows = reference.skin.vertices, (sampling @ as_drawn).tocsr()
     upper = rest.lip_pairs[rest.rim[rest.lip_pairs].all(axis=1), 0]
-    told = told_of_smile(reference, as_drawn, upper[np.abs(cage[upper, 0]).argmin()])
+    lip = upper[np.abs(cage[upper, 0]).argmin()]
     found = explain(table, cage, reference.jaw, rows, offsets, people, noise, muscles, known)
+    told = told_of_smile(reference, table, as_drawn, lip, found.jaw)
     smiling = smiles(told, table, found)
     if smiling:
         found = explain(table, cage, reference.jaw, rows, offsets, people, noise, of_smile, known, told)
