@@ -104,9 +104,7 @@ def test_step_is_stable_and_ends_at_the_solution(model, pulled, dt):
     for _ in range(25):
         state = step(model, state, asked, dt)
         moved = np.abs(state.skin - model.layers.nodes[: model.count]).max()
-        assert (
-            moved < 2.2 * pulled.diagnostics["peak_mm"]
-        )  # what is let go swings to twice, stiffening springs a little more
+        assert moved < 2.5 * pulled.diagnostics["peak_mm"]  # let go it swings to twice, where it is light farther
     if dt > 0.01:
         assert np.abs(state.skin - pulled.state.skin).max() < 0.2
 
