@@ -7,6 +7,7 @@ least motion of the vertices that does it.
 """
 
 import numpy as np
+from scipy import sparse
 
 from ..mesh import vertex_normals
 from .drawn_contact import eye_contacts
@@ -89,7 +90,8 @@ def way_out(planes, positions, free, kept: float = 0.0) -> np.ndarray | None:
 def _least_motion(rows, wanted, free):
     """(n, 3) mm, about the smallest motion of the ``free`` (n,) vertices by which ``rows @ motion`` (c,) is at least
     ``wanted`` (c,): surfaces push, they do not pull, so by projected Jacobi steps on the pushes."""
-    rows = rows.multiply(np.repeat(free, 3)[None]).tocsr()
+    held = rows.data * np.repeat(free, 3)[rows.indices]
+    rows = sparse.csr_matrix((held, rows.indices, rows.indptr), rows.shape)
     product = (rows @ rows.T).tocsr()
     size = np.maximum(np.asarray(abs(product).sum(axis=1)).ravel(), 1e-9)
     push = wanted / size

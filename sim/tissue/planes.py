@@ -71,6 +71,8 @@ def contact_pushes(planes: Planes, positions, stiffness: float):
     """Energy ½ k Σ depth², the nodes (k,) that touch and its gradient there (k, 3); a node may come more than once."""
     depth = depths(planes, positions)
     hit = np.flatnonzero(depth > 0)
+    if not len(hit):
+        return 0.0, hit, np.zeros((0, 3))
     push = -stiffness * depth[hit, None] * planes.normal[hit]
     pair = planes.partner[hit]
     both = pair >= 0
