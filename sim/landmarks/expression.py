@@ -15,7 +15,6 @@ FAR = 3.0  # mm that a point of the skin without data counts as
 AROUND_MOUTH = 35.0  # mm
 SHUT = 0.6  # eyes shut this far though they were taken for open are shut: a broad smile shuts them by 0.4
 REASON = 0.95  # shut eyes must fit that much better
-PARTED = 0.97  # and so must parted lips
 LOOKED = np.linspace(-0.28, 0.28, 9)  # shares of the way from the middle of the mouth to its corners
 #: Shares of the way along an eye at which it is looked over, mm above and below, places looked at; mm of a hole, and the
 #: share of lines with one from which on the eyes are open.
@@ -30,7 +29,7 @@ def fit_expression(space: ShapeSpace, target: Surface, fit: ShapeFit):
     moved = fit.coefficients + space.parted
     free = yield from _half(fit_shape(space, target, fit.pose, CHANGE, moved, 1, Expression(True)), 0.0)
     mouth = about_mouth(space)
-    parted = lips_parted(space, free, target) and cost(space, free, mouth) < PARTED * cost(space, fit, mouth)
+    parted = lips_parted(space, free, target) and cost(space, free, mouth) < cost(space, fit, mouth)
     fit = free if parted else fit
     holes = holes_in_eyes(space.landmarks(fit.points), fit.matrix, target)
     if holes < HOLED_SHUT and min(shut_share(space, fit).values()) > SHUT:
