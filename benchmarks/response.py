@@ -6,8 +6,9 @@
 Errors are against the converged simulation (contacts and all) on poses that were no samples: one, three or all muscles
 at random, the same with the jaw anywhere in its range, ARKit shapes on top of each other, poses between two expressions,
 all expressions and all ARKit shapes; of the rig and of the shape keys that are baked from it. Mixtures that the rig is
-learnt from are composed of rows of the same tables, but hold none of them as it stands there. Eyeballs: how deep the drawn
-lids sink into them, beyond rest, in the ARKit shapes and in looks to all sides under lids that close.
+learnt from are composed of rows of the same tables, at other strengths; rows of one channel alone are samples.
+Eyeballs: how deep the drawn lids sink into them, beyond rest, in the ARKit shapes and in looks to all sides under lids
+that close.
 Prints a table and, on the last line, the same as JSON.
 """
 

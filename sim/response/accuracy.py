@@ -92,7 +92,7 @@ def measured(
     keys: Keys | None = None,
 ) -> Work:
     """Kind of pose -> `summary` of the rig, with that of its shape keys as ``keys`` if they are given; ``count`` poses of
-    every kind that is drawn at random, none of them a sample."""
+    every kind that is drawn at random. None is a sample but rows of a table that are one channel alone."""
     report = {}
     for number, kind in enumerate(kinds):
         poses = unseen_poses(model.muscle_names, kind, count, np.random.default_rng([seed, number]))
