@@ -28,6 +28,8 @@ CLEAR, REACH = 0.15, 1.2
 WIDE, DRAPED = 2.4, 5.0
 #: mm between the points of lips and lining at which what is left of teeth in them is looked for.
 CLOSE = 1.2
+#: mm round fascia at rest in which there is bone for it to slide over, as that of the lips does over the chin.
+FAR_OVER_BONE = 16.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,8 +51,8 @@ class Within:
     kept: np.ndarray
 
 
-def _within(mesh, lower, points, places, spacing) -> Within:
-    solid = build_solid(mesh, lower, places, spacing)
+def _within(mesh, lower, points, places, spacing, reach) -> Within:
+    solid = build_solid(mesh, lower, places, spacing, reach)
     kept = np.zeros(len(places))
     rows, _, height, _ = solid.planes(places, np.eye(3), np.zeros(3))
     kept[rows] = np.minimum(height, 0)
@@ -83,6 +85,7 @@ class DrawnSurfaces:
                 before.points,
                 before.points.at(rest),
                 0.5,
+                8.0,
             )
             for before in self.fine_teeth
             if len(before.points)
@@ -93,7 +96,7 @@ class DrawnSurfaces:
         """Skull and mandible as solids, for the fascia that stands on each."""
         n = len(self.nodes) // 3
         return tuple(
-            _within(self.rigid[name], name == "mandible", column, self.nodes[n + column], 1.0)
+            _within(self.rigid[name], name == "mandible", column, self.nodes[n + column], 1.0, FAR_OVER_BONE)
             for name, column in self.fascia.items()
         )
 

@@ -46,10 +46,10 @@ class Solid:
         return rows, normal @ rotation.T if self.lower else normal, height, self.material[near]
 
 
-def build_solid(mesh: Mesh, lower: bool, about: np.ndarray, spacing: float = 0.5) -> Solid:
-    """The solid of ``mesh`` as far as it is within 8 mm of the points ``about`` (k, 3) mm; points ``spacing`` mm apart."""
+def build_solid(mesh: Mesh, lower: bool, about: np.ndarray, spacing: float = 0.5, reach: float = 8.0) -> Solid:
+    """The solid of ``mesh`` as far as it is within ``reach`` mm of the points ``about`` (k, 3) mm; points ``spacing`` apart."""
     tri = mesh.vertices[short_diagonals(mesh.vertices, mesh.faces)]
-    low, high = about.min(axis=0) - 8, about.max(axis=0) + 8
+    low, high = about.min(axis=0) - reach, about.max(axis=0) + reach
     # cells that are the same on both sides
     high[0] = np.ceil(np.abs([low[0], high[0]]).max() / spacing) * spacing
     low[0] = -high[0]
@@ -77,7 +77,7 @@ def build_solid(mesh: Mesh, lower: bool, about: np.ndarray, spacing: float = 0.5
     points, owner = points[seen], owner[seen]
     seen = ~_buried(points, normal[owner], kind[owner], spacing)
     points, owner = points[seen], owner[seen]
-    near = np.isfinite(cKDTree(about).query(points, distance_upper_bound=8.0)[0])
+    near = np.isfinite(cKDTree(about).query(points, distance_upper_bound=reach)[0])
     points, owner = points[near], owner[near]
     return Solid(points, normal[owner], kind[owner], cKDTree(points), lower, spacing)
 
