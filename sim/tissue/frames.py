@@ -8,10 +8,13 @@ change of the control.
 
 import numpy as np
 
+from ..mesh import vertex_normals
 from .clearing import cleared, way_out
 from .curvature import Curvature
 from .drawn_contact import CLEAR
+from .drawn_samples import planes_of
 from .energy import Pose, find_contacts, pose_of
+from .flesh import flesh_contacts
 from .forces import Landscape
 from .lid_meeting import met
 from .solver import descend, factorised, minimise, rest_state
@@ -23,6 +26,8 @@ STEPS, TOLERANCE = 6, 0.05
 SETTLED = 0.01
 #: The last step is taken without a look at the energy behind it if no node moves farther, mm.
 _TRUST = 0.3
+#: Rounds of moving the skin clear of what is left at the end of a frame.
+_ROUNDS = 5
 #: Frames before that foretell the next, how far they may not be trusted (ridge, a share of their changes), and how much
 #: of their motion a frame may begin with (factor, mm).
 _PAST, _RIDGE, _MOST, _FAR = 2, 0.1, 1.5, 3.0
@@ -57,14 +62,25 @@ class Frames:
         positions, self.residual, self.iterations, planes = self._descended(pose, start, steps, tolerance)
         self.converged = self.residual <= tolerance
         self._at = positions
-        # contact keeps a little off: what is nearer has not gone through
-        positions = met(model, pose.shut, positions)
-        out = way_out(planes, positions, model.layers.free[: model.count], CLEAR)
-        if out is not None:
-            positions = positions.copy()
-            positions[: model.count] += out
+        positions = self._clear(planes, met(model, pose.shut, positions))
         self.state = State(positions, np.zeros_like(positions))
         return self.state
+
+    def _clear(self, planes, positions):
+        """``positions`` (3 n, 3) mm out of the ``planes`` of contact, and flesh that is drawn too thin as thick as may be."""
+        model = self.model
+        n, free = model.count, model.layers.free[: model.count]
+        kept = CLEAR  # contact keeps a little off: what is nearer has not gone through
+        for _ in range(_ROUNDS):
+            out = way_out(planes, positions, free, kept)
+            if out is not None:
+                positions = positions.copy()
+                positions[:n] += out
+            elif kept == 0:
+                break
+            normals = vertex_normals(positions[:n], model.contacts.triangles)
+            planes, kept = planes_of([flesh_contacts(model.drawn.flesh, positions[:n], normals)], n), 0.0
+        return positions
 
     def _descended(self, pose: Pose, start, steps, tolerance):
         """Positions (3 n, 3) mm, the mm of the last step, the steps, and the contacts, found once for a few steps."""
