@@ -34,8 +34,10 @@ class BoxTree:
     @classmethod
     def of(cls, vertices, triangles, margin: float = 0.0) -> "BoxTree":
         """The boxes round triangles (m, 3) over vertices (n, 3) mm, each ``margin`` mm larger."""
-        corners = np.asarray(vertices, dtype=float)[triangles]
-        return cls(corners.min(axis=1) - margin, corners.max(axis=1) + margin)
+        planes, triangles = np.ascontiguousarray(np.asarray(vertices, dtype=float).T), np.asarray(triangles)
+        a, b, c = (planes.take(triangles[:, k], axis=1) for k in range(3))
+        low, high = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
+        return cls(low.T - margin, high.T + margin)
 
     @cached_property
     def _planes(self):
@@ -127,10 +129,12 @@ class BoxTree:
 
 def morton(points):
     """(n,) int64 for points (n, 3): the bits of x, y and z in turn, 1024 steps along the longest side."""
-    span = max(float(np.ptp(points, axis=0).max()), 1e-12)
-    cell = ((points - points.min(axis=0)) / span * 1023).astype(np.int64)
-    code = np.zeros(len(points), dtype=np.int64)
-    for bit in range(10):
-        for axis in range(3):
-            code |= (cell[:, axis] >> bit & 1) << (3 * bit + axis)
-    return code
+    planes = np.ascontiguousarray(points.T)
+    low, high = planes.min(axis=1), planes.max(axis=1)
+    span = max(float((high - low).max()), 1e-12)
+    cell = ((planes - low[:, None]) / span * 1023).astype(np.int64)
+    # Ten bits spread out, two places between each, by halves.
+    for shift, mask in ((16, 0x30000FF), (8, 0x300F00F), (4, 0x30C30C3), (2, 0x9249249)):
+        cell |= cell << shift
+        cell &= mask
+    return cell[0] | cell[1] << 1 | cell[2] << 2

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Triangles covered by sample points of about equal spacing, kept in one k-d tree."""
 
-from itertools import chain
-
 import numpy as np
 from scipy.spatial import cKDTree
 
@@ -36,26 +34,18 @@ class Cover:
         far, sample = self._tree.query(points, k=count, distance_upper_bound=reach + self.most, workers=cores)
         return far.reshape(len(points), count), sample.reshape(len(points), count)
 
-    def within(self, points, reach):
-        """Pairs of a point and a sample no farther than ``reach`` mm from it: (p,), (p,) and their distance (p,) mm."""
-        lists = self._tree.query_ball_point(points, reach, return_sorted=False)
-        size = np.fromiter(map(len, lists), dtype=np.int64, count=len(lists))
-        sample = np.fromiter(chain.from_iterable(lists), dtype=np.int64, count=int(size.sum()))
-        row = np.repeat(np.arange(len(lists)), size)
-        off = points[row] - self._tree.data[sample]
-        return row, sample, np.sqrt(np.einsum("ij,ij->i", off, off))
-
 
 def spread(corners: np.ndarray, spacing: float):
     """Sample points over triangles (m, 3, 3) -> points (s, 3), owner (s,), covering radius (m,) in mm."""
-    middle = corners.mean(axis=1)
-    reach = np.sqrt(((corners - middle[:, None]) ** 2).sum(2).max(1))
+    planes = np.ascontiguousarray(corners.reshape(-1, 9).T).reshape(3, 3, -1)  # corner, axis, triangle
+    middle = planes.sum(axis=0) / 3
+    reach = np.sqrt(np.maximum.reduce([((corner - middle) ** 2).sum(axis=0) for corner in planes]))
     parts = np.clip(np.ceil(reach / spacing), 1, 24).astype(int)
     while (parts**2).sum() > max(SAMPLES, 2 * len(corners)):
         spacing *= 1.2
         parts = np.clip(np.ceil(reach / spacing), 1, 24).astype(int)
     points, owner = [], []
-    for n in np.unique(parts):
+    for n in np.flatnonzero(np.bincount(parts)):
         of = np.flatnonzero(parts == n)
         i, j = np.divmod(np.arange(n * n), n)
         up = i + j < n
@@ -63,6 +53,11 @@ def spread(corners: np.ndarray, spacing: float):
         b = np.concatenate([(i[up] + 1 / 3) / n, (i[(i + j) < n - 1] + 2 / 3) / n])
         c = np.concatenate([(j[up] + 1 / 3) / n, (j[(i + j) < n - 1] + 2 / 3) / n])
         weights = np.stack([1 - b - c, b, c], axis=1)
-        points.append(np.einsum("sk,mkx->msx", weights, corners[of]).reshape(-1, 3))
-        owner.append(np.repeat(of, len(weights)))
-    return np.concatenate(points), np.concatenate(owner), reach / parts
+        points.append(
+            (weights @ planes.take(of, axis=2).reshape(3, -1))
+            .reshape(len(weights), 3, -1)
+            .transpose(1, 0, 2)
+            .reshape(3, -1)
+        )
+        owner.append(np.tile(of, len(weights)))
+    return np.concatenate(points, axis=1).T.copy(), np.concatenate(owner), reach / parts

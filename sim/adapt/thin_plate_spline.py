@@ -10,7 +10,7 @@ import numpy as np
 from scipy.linalg import lu_factor, lu_solve
 from scipy.spatial.distance import cdist
 
-BLOCK = 2_000_000  # entries of the distance table held at once (16 MB)
+BLOCK = 100_000  # entries of the distance table held at once: few enough to stay in the cache of a core
 
 
 def similarity(source, target, weights=None, mirror: bool | None = False):
