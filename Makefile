@@ -49,6 +49,7 @@ bench: $(READY)
 	$(PY) benchmarks/adapt.py
 	$(PY) benchmarks/tissue.py
 	$(PY) benchmarks/frames.py
+	$(PY) benchmarks/penetration.py
 	$(PY) benchmarks/response.py
 
 $(READY): pyproject.toml
