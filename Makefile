@@ -18,7 +18,7 @@ endif
 PY := $(VENV)/bin/python
 READY := $(VENV)/.ready
 
-# Several threads of linear algebra sum in another order, and the texture map relaxes to another state.
+# Several threads of linear algebra sum in another order: strengths would differ in their last digits.
 ONE := OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1
 
 .PHONY: demo test check assets sheets extension bench clean

@@ -4,7 +4,7 @@
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ...sim.anatomy.muscle_room import Samples
+from ...sim.anatomy.muscle_room import DIGITS, Samples
 from ...sim.mesh import Mesh
 
 #: mm left between two layers; how far beside a point a deeper muscle still counts as under it.
@@ -37,7 +37,7 @@ class Layers:
         tree = cKDTree(deeper)
         # along the line through each point: the samples beside it
         for step in np.arange(-7.0, 8.1, 1.5):
-            far, near = tree.query(points + step * normals, distance_upper_bound=1.2 * BESIDE)
+            far, near = tree.query(np.round(points + step * normals, DIGITS), distance_upper_bound=1.2 * BESIDE)
             found = np.flatnonzero(np.isfinite(far))
             away = deeper[near[found]] - points[found]
             above = np.einsum("nj,nj->n", away, normals[found])

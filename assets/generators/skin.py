@@ -14,6 +14,7 @@ from .skin_landmarks import skin_landmarks
 from .skin_layout import skin_layout
 from .skin_shape import landmark_seeds, mean_shape
 from .skin_uv import skin_uv
+from .steps import stepped
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +30,7 @@ class Skin:
 def make_skin(vertices: np.ndarray | None = None) -> Skin:
     """The reference skin; ``vertices`` (n, 3) mm replace the mean shape's (another head on the same layout)."""
     layout = skin_layout()
-    vertices = finish_shape(layout, mean_shape()) if vertices is None else vertices
+    vertices = stepped(finish_shape(layout, mean_shape()) if vertices is None else vertices)
     mesh = Mesh(
         vertices,
         layout.faces,

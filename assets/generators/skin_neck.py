@@ -98,7 +98,9 @@ def finish_neck(layout: Layout, x: np.ndarray) -> None:
     skin, normal = Surface(whole, triangles), vertex_normals(whole, triangles)
     out = np.zeros(layout.count)
     for _, line, height, sigma in BRUSHES:
-        on_skin = skin.closest(_upright(np.array(line, float))).points
+        line = _upright(np.array(line, float))
+        on_skin = skin.closest(line).points
+        on_skin[line[:, 0] == 0, 0] = 0  # of two places as near on either side, rounding would choose
         out += height * np.exp(-((_to_line(whole, on_skin) / sigma) ** 2) / 2)
     inside = np.concatenate([rings.ravel() for rings in layout.rings.values()])
     out[inside] = 0

@@ -5,6 +5,8 @@ import numpy as np
 from scipy.sparse import coo_matrix, diags, identity
 from scipy.sparse.linalg import splu, spsolve
 
+from .steps import stepped
+
 
 def mean_value(vertices: np.ndarray, triangles: np.ndarray, fixed: np.ndarray, where: np.ndarray) -> np.ndarray:
     """(n, 2) by mean value weights (Floater 2003); ``fixed`` vertices at ``where`` (k, 2), a convex outline."""
@@ -49,6 +51,7 @@ def _energy(flat, triangles, inverse, area):
         for k, value in ((1, corner[:, axis, 0]), (2, corner[:, axis, 1])):
             gradient[:, axis] += np.bincount(triangles[:, k], value, minlength=len(flat))
             gradient[:, axis] -= np.bincount(triangles[:, 0], value, minlength=len(flat))
+    gradient = gradient.astype(np.float32).astype(float)  # slopes of slivers are steep: in steps of their own size
     return float((area * size * (1 + 1 / det**2)).sum()), gradient, det.min()
 
 
@@ -56,7 +59,7 @@ def relax(vertices, triangles, flat, gain, weight, on_axis, rounds: int = 300) -
     """(n, 2): ``flat`` moved toward true lengths times ``gain`` (t,) without ever folding a triangle.
 
     ``weight`` (t,) says how much a triangle counts for its area. Vertices ``on_axis`` stay on x = 0; all others are
-    free. Descent preconditioned by a Laplacian of the mesh.
+    free. Descent preconditioned by a Laplacian of the mesh; in `steps`, for rounding errors grow from round to round.
     """
     a, b, c = (vertices[triangles[:, k]] for k in range(3))
     e1, e2 = b - a, c - a
@@ -70,7 +73,7 @@ def relax(vertices, triangles, flat, gain, weight, on_axis, rounds: int = 300) -
     inverse = np.linalg.inv(rest)
     fa, fb, fc = (flat[triangles[:, k]] for k in range(3))
     flat_area = 0.5 * np.abs((fb - fa)[:, 0] * (fc - fa)[:, 1] - (fb - fa)[:, 1] * (fc - fa)[:, 0]).sum()
-    flat = flat * np.sqrt((area * gain**2).sum() / flat_area)
+    flat = stepped(flat * np.sqrt((area * gain**2).sum() / flat_area))
     n = len(vertices)
     pairs = np.concatenate([triangles[:, [k, (k + 1) % 3]] for k in range(3)])
     link = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(n, n)).tocsr()
@@ -103,7 +106,7 @@ def relax(vertices, triangles, flat, gain, weight, on_axis, rounds: int = 300) -
             continue
         step = min(1.0, 4 * step)
         while step > 1e-9:
-            trial = flat + step * direction
+            trial = stepped(flat + step * direction)
             value, new_gradient, _ = _energy(trial, triangles, inverse, area)
             if value <= energy + 1e-4 * step * slope:
                 break

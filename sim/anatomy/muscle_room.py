@@ -16,6 +16,8 @@ MANY = 1000
 SPACING = 1.6
 #: mm of skin kept over a muscle; how near it may come to the lining of mouth and lids, and to bone.
 SKIN_CLEAR, LINING_CLEAR, BONE_CLEAR, EYE_CLEAR = 0.45, 0.2, 0.22, 0.25
+#: Digits of a millimetre by which the nearest is told: of two as near, rounding errors would choose.
+DIGITS = 6
 #: Cosine to a wall under which it stands beside a way, not across it; mm beyond which nothing bounds a way, and by how
 #: many at once a point is brought back; mm within bone that are believed.
 ASIDE, FAR, DEEP, BURIED = 0.3, 6.0, 2.0, 3.0
@@ -139,7 +141,7 @@ class Samples:
             some = np.flatnonzero(parts == n)
             points.append(np.einsum("wk,tkd->twd", w, corner[some]).reshape(-1, 3))
             owner.append(np.repeat(some, len(w)))
-        self.points, self._owner = np.concatenate(points), np.concatenate(owner)
+        self.points, self._owner = np.round(np.concatenate(points), DIGITS), np.concatenate(owner)
         self._corner, self._bent, self._solid = corner, bent, Triangles(corner)
         self.normals = _unit(bent.mean(axis=1))[self._owner]
         self._tree = cKDTree(self.points)
@@ -153,13 +155,14 @@ class Samples:
         """
         count = min(3, len(self.points))  # in a fold the nearest sample may not be the nearest triangle's
         cores = -1 if len(points) >= MANY else 1
+        points = np.round(points, DIGITS)
         far, near = self._tree.query(points, k=count, distance_upper_bound=reach, workers=cores)
         far, near = far.reshape(len(points), -1), near.reshape(len(points), -1)
         found = np.isfinite(far[:, 0])
         triangle = self._owner[np.where(np.isfinite(far), near, np.where(found[:, None], near[:, :1], 0))]
         rows = np.repeat(np.arange(len(points)), count)
         weights, distance = self._solid.closest(points, rows, triangle.ravel())
-        best = distance.reshape(-1, count).argmin(axis=1) + count * np.arange(len(points))
+        best = np.round(distance, DIGITS).reshape(-1, count).argmin(axis=1) + count * np.arange(len(points))
         weights, distance, triangle = weights[best], distance[best], triangle.ravel()[best]
         smooth = _unit(np.einsum("nk,nkd->nd", weights, self._bent[triangle]))
         away = points - np.einsum("nk,nkd->nd", weights, self._corner[triangle])
@@ -169,6 +172,7 @@ class Samples:
 
     def about(self, points):
         """(n,) mm to the nearest sample, negative inside, infinite beyond 3 mm: quick and rough."""
+        points = np.round(points, DIGITS)
         far, near = self._tree.query(points, distance_upper_bound=3.0)
         near = np.where(np.isfinite(far), near, 0)
         inside = ((points - self.points[near]) * self.normals[near]).sum(1) < 0
@@ -176,11 +180,11 @@ class Samples:
 
     def nearest(self, points):
         """(n, 3) mm: the sample nearest to each point."""
-        return self.points[self._tree.query(points)[1]]
+        return self.points[self._tree.query(np.round(points, DIGITS))[1]]
 
     def smooth_normal(self, points, count: int = 24):
         """(n, 3) unit: the mean direction of the nearest samples."""
-        far, near = self._tree.query(points, k=min(count, len(self.points)))
+        far, near = self._tree.query(np.round(points, DIGITS), k=min(count, len(self.points)))
         weight = np.exp(-(((far - far[:, :1]) / 2.5) ** 2))[..., None]
         normal = (weight * self.normals[near]).sum(axis=1)
         return normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-9)

@@ -10,7 +10,7 @@ import numpy as np
 from scipy import sparse
 
 from ..mesh import vertex_normals
-from .drawn_contact import eye_contacts
+from .drawn_contact import OFF_BONE, eye_contacts
 from .drawn_lips import lip_contacts
 from .drawn_samples import planes_of
 from .flesh import flesh_contacts
@@ -30,8 +30,9 @@ LIP_REACH = 4.0
 _ENAMEL = 0
 
 
-def surfaces_of(model: Model, pose, positions) -> dict:
-    """Pair of `PAIRS` -> `Planes` of what is nearly in touch at ``positions`` (3 n, 3), as exact as the drawn surface."""
+def surfaces_of(model: Model, pose, positions, off_bone: float = 0.0) -> dict:
+    """Pair of `PAIRS` -> `Planes` of what is nearly in touch at ``positions`` (3 n, 3), as exact as the drawn surface;
+    fascia ``off_bone`` mm from bone where it has that at rest."""
     n = model.count
     skin, drawn = positions[:n], model.drawn
     at = pose.rotation, pose.translation
@@ -52,7 +53,7 @@ def surfaces_of(model: Model, pose, positions) -> dict:
     for within in drawn.bones:
         fascia = positions[n + within.points]
         rows, normal, height, _ = within.solid.planes(fascia, *at, reach=8.0)
-        level = np.einsum("ij,ij->i", fascia[rows], normal) - height + within.kept[rows]
+        level = np.einsum("ij,ij->i", fascia[rows], normal) - height + np.minimum(within.kept[rows], off_bone)
         bones.append(touching(n + within.points[rows], normal, level))
     return {name: planes_of(pieces, n) for name, pieces in found.items()} | {"fascia_skull": joined(*bones)}
 
@@ -64,7 +65,7 @@ def cleared(model: Model, pose, positions) -> np.ndarray:
     out = out.copy() if out is positions else out
     n = model.count
     for _ in range(ROUNDS):
-        found = surfaces_of(model, pose, out)
+        found = surfaces_of(model, pose, out, OFF_BONE)
         normals = vertex_normals(out[:n], model.contacts.triangles)
         found["flesh"] = planes_of([flesh_contacts(model.drawn.flesh, out[:n], normals)], n)
         out = project(found.pop("fascia_skull"), out, rounds=1)

@@ -30,6 +30,8 @@ WIDE, DRAPED = 2.4, 5.0
 CLOSE = 1.2
 #: mm round fascia at rest in which there is bone for it to slide over, as that of the lips does over the chin.
 FAR_OVER_BONE = 16.0
+#: mm that fascia is kept off bone in the end: between its samples bone bulges.
+OFF_BONE = 0.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,18 +46,18 @@ class Before:
 @dataclass(frozen=True, eq=False)
 class Within:
     """A `Solid`, its ``points`` (k, `Samples` of the skin or columns of fascia) that stay out of it, and the mm (k,) in
-    front of it, at most 0, that they keep because they are no farther at rest."""
+    front of it that they keep, no more than they have at rest (within it: less than 0)."""
 
     solid: Solid
     points: Any
     kept: np.ndarray
 
 
-def _within(mesh, lower, points, places, spacing, reach) -> Within:
+def _within(mesh, lower, points, places, spacing, reach, off=0.0) -> Within:
     solid = build_solid(mesh, lower, places, spacing, reach)
-    kept = np.zeros(len(places))
+    kept = np.full(len(places), off)
     rows, _, height, _ = solid.planes(places, np.eye(3), np.zeros(3))
-    kept[rows] = np.minimum(height, 0)
+    kept[rows] = np.minimum(height, off)
     return Within(solid, points, kept)
 
 
@@ -96,7 +98,7 @@ class DrawnSurfaces:
         """Skull and mandible as solids, for the fascia that stands on each."""
         n = len(self.nodes) // 3
         return tuple(
-            _within(self.rigid[name], name == "mandible", column, self.nodes[n + column], 1.0, FAR_OVER_BONE)
+            _within(self.rigid[name], name == "mandible", column, self.nodes[n + column], 1.0, FAR_OVER_BONE, OFF_BONE)
             for name, column in self.fascia.items()
         )
 
