@@ -32,7 +32,7 @@ def _patch(side=6, depth=3.0, curve=0.02):
     one, free = np.ones(n), np.ones(2 * n, bool)
     foot = skin - depth * normal
     nodes = np.concatenate([skin, skin - 0.5 * depth * normal, foot])
-    layers = Layers(nodes, 4 * one, one > 0, 0 * one, 0 * one, normal, one, one, one, free)
+    layers = Layers(nodes, 4 * one, one > 0, 0 * one, 0 * one, np.zeros(3 * n), normal, one, one, one, free)
     attachments = Attachments(foot, None, 0 * one, one)
     springs = build_skin_mesh(faces, skin, attachments, layers, NO_TIES, DEFAULT)
     return np.concatenate([skin, foot, mirrored(skin, foot)]), springs, triangles, layers
@@ -48,7 +48,7 @@ def _single():
     skin, foot = np.array([[0.0, 0, 2]]), np.zeros((1, 3))
     one, free = np.ones(1), np.ones(2, bool)
     nodes = np.array([[0.0, 0, 2], [0, 0, 1], [0, 0, 0]])
-    layers = Layers(nodes, one, one > 0, 0 * one, 0 * one, np.array([[0.0, 0, 1]]), one, one, one, free)
+    layers = Layers(nodes, one, one > 0, 0 * one, 0 * one, np.zeros(3), np.array([[0.0, 0, 1]]), one, one, one, free)
     faces = np.zeros((0, 4), np.int32)
     attachments = Attachments(foot, None, 0 * one, one)
     springs = build_skin_mesh(faces, skin, attachments, layers, NO_TIES, DEFAULT)

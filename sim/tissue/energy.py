@@ -56,12 +56,14 @@ class Pose:
 
 
 def posed_reference(model: Model, rotation, translation) -> np.ndarray:
-    """(3 n, 3) mm: every node moved by its share with the mandible."""
-    layers = model.layers
+    """(3 n, 3) mm: every node moved by its share with the mandible; the throat sinks besides as the jaw turns down."""
+    layers, jaw = model.layers, model.jaw
     moved = layers.nodes @ rotation.T + translation
     moved -= layers.nodes
     moved *= np.concatenate([layers.jaw, layers.jaw, layers.mandible])[:, None]
     moved += layers.nodes
+    ahead = jaw.incisor - (jaw.condyle_l + jaw.condyle_r) / 2
+    moved[:, 2] += (rotation @ ahead - ahead)[2] * layers.sink
     return moved
 
 

@@ -15,6 +15,7 @@ from .geometry import Surface, cotangent_stiffness, short_diagonals, smoothed, v
 from .gingiva import ATTACHED, attached
 from .parameters import Parameters
 from .structures import Layers
+from .throat import build_throat
 
 #: Boneless places: depth in mm from skin to fascia, factor on the restoration, on the muscle-layer springs, on the
 #: sheet. Later rows win where groups overlap.
@@ -70,7 +71,9 @@ def build_layers(head: Head, parameters: Parameters) -> Layers:
         soft = np.maximum(soft, w)
         pairs = ((depth, d), (hold, h), (layer, m), (sheet, e))
         depth, hold, layer, sheet = (x + w * (y - x) for x, y in pairs)
-    inner = groups.get("inner", np.zeros(n))
+    inner, jaw = groups.get("inner", np.zeros(n)), groups.get("jaw", np.zeros(n))
+    throat = build_throat(jaw, groups.get("neck", np.zeros(n)), stiffness, area)
+    soft, sheet = np.maximum(soft, throat.off), sheet * throat.sheet
     lips = np.flatnonzero(np.maximum(_sides(groups, "lip_upper"), _sides(groups, "lip_lower")) > 0.5)
     if len(lips):  # the vestibule behind the lips goes where they go; the depth of the mouth stays
         deep = np.clip((cKDTree(v[lips]).query(v)[0] - 10) / 15, 0, 1)
@@ -95,8 +98,7 @@ def build_layers(head: Head, parameters: Parameters) -> Layers:
     restoration = parameters.restoration_area * area * smoothed(factor, stiffness, area, 3.0)
     restoration = restoration * (1 + 12 * np.clip(1 - face, 0, 1) ** 2)
     gum, below = attached(head)
-    restoration += gum * ATTACHED * parameters.restoration_area * area
-    jaw = groups.get("jaw", np.zeros(n))
+    restoration += (gum * ATTACHED + throat.hold) * parameters.restoration_area * area
     jaw = jaw + gum * (below - jaw)
     mandible = np.where(bony, nearer.astype(float), jaw)
     movable = face > 0.02
@@ -110,6 +112,7 @@ def build_layers(head: Head, parameters: Parameters) -> Layers:
         bony=bony,
         mandible=mandible,
         jaw=jaw,
+        sink=np.concatenate([throat.sink, throat.sink, np.where(bony, 0.0, throat.sink)]),
         bone_normal=bone_normal,
         restoration=restoration,
         soften=soften,

@@ -13,7 +13,7 @@ from .clearing import cleared
 from .curvature import Curvature
 from .diagnostics import diagnose
 from .dissection import Dissection, parted
-from .energy import find_contacts, pose_of
+from .energy import find_contacts, pose_of, posed_reference
 from .forces import Landscape
 from .structures import Control, Model, Solution, State
 
@@ -93,9 +93,7 @@ def _reference_of(model, bones):
     ca, cb = a.mean(axis=0), b.mean(axis=0)
     u, _, vt = np.linalg.svd((b - cb).T @ (a - ca))
     rotation = u @ np.diag([1, 1, np.sign(np.linalg.det(u @ vt))]) @ vt
-    moved = layers.nodes @ rotation.T + (cb - rotation @ ca)
-    w = np.concatenate([layers.jaw, layers.jaw, layers.mandible])[:, None]
-    return layers.nodes + w * (moved - layers.nodes)
+    return posed_reference(model, rotation, cb - rotation @ ca)
 
 
 def factorised(model: Model, dt: float | None = None):

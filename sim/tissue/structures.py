@@ -13,13 +13,15 @@ from .surroundings import Surroundings
 
 @dataclass(frozen=True, eq=False)
 class Layers:
-    """Where the prisms stand (Lee, Terzopoulos and Waters 1995, 3.1). All (n,) or (n, 3), one column per skin vertex.
+    """Where the prisms stand (Lee, Terzopoulos and Waters 1995, 3.1). All (n,) or (n, 3), one column per skin vertex,
+    but for what is said of single nodes.
 
     nodes : (3 n, 3) mm at rest: epidermis, then fascia, then the bone node (or soft anchor) of each column
     area : mm² of skin each column stands for
     bony : bool, the column stands on bone
     mandible : share 0..1 by which the bone node moves with the mandible
     jaw : share by which skin and fascia would move with the mandible if they were free of all else
+    sink : (3 n,) share by which each node goes down besides as the lower incisors do when the jaw turns (`throat`)
     bone_normal : (n, 3) outward normal of the bone under the column
     restoration : stiffness of the nodal restoration force of 3.8
     soften : factor 0..1 on the muscle-layer springs (boneless places)
@@ -32,6 +34,7 @@ class Layers:
     bony: np.ndarray
     mandible: np.ndarray
     jaw: np.ndarray
+    sink: np.ndarray
     bone_normal: np.ndarray
     restoration: np.ndarray
     soften: np.ndarray
