@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The solver frame by frame along a performance: time a frame, and how far the skin is from the converged pose.
 
-    python benchmarks/frames.py [--fps 60] [--steps 6] [--tolerance 0.05] [--runs 3]
+    python benchmarks/frames.py [--fps 60] [--steps 7] [--tolerance 0.05] [--runs 3]
 
 In 3.5 s the face smiles, laughs with the jaw falling open in 0.2 s, speaks (m a u i m), blinks twice, is angry and then
 surprised. Every frame is also solved until it rests (each from the one before), contact included; the error is the root mean

@@ -19,6 +19,8 @@ _ANGLES, _HEIGHTS = 96, 16
 _CLEARANCE = 0.25
 #: mm by which the wall draws back for each mm past the biting edge.
 _DRAW = 1.5
+#: mm away for each mm over the wall, as it draws back; mm that what has no teeth behind it is away from them, at least.
+_LEAST, BESIDE = 0.5, 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,18 +137,24 @@ def arch_contacts(surfaces, positions, rotation, translation) -> Planes:
     return Planes(node, normal, level, np.full(len(node), -1))
 
 
-def wall_planes(arch: Arch, points, clearance, rotation, translation, reach: float = 4.0):
+def wall_planes(arch: Arch, points, clearance, rotation, translation, reach: float = 4.0, nearby=None):
     """The wall as tangent planes before ``points`` (k, 3): rows (c,) of those nearer than ``reach`` mm or behind it,
-    normals (c, 3) and mm (c,) by which each is to go on along its normal to keep its ``clearance`` (k,) mm."""
+    normals (c, 3) and mm (c,) by which each is to go on along its normal to keep its ``clearance`` (k,) mm.
+
+    nearby : `Nearby`, if far points are to be looked at more seldom
+    """
     if arch.lower:
         points = (points - translation) @ rotation
-    angle, far, radial = arch.coordinates(points)
-    wall, over_angle, over_height = arch.wall(angle, points[:, 2])
-    keep = np.flatnonzero((wall > 0) & (far < wall + reach))
-    angle, far, radial, wall = angle[keep], far[keep], radial[keep], wall[keep]
+    keep = np.arange(len(points)) if nearby is None else nearby.due(arch, points)
+    angle, far, radial = arch.coordinates(points[keep])
+    wall, over_angle, over_height = arch.wall(angle, points[keep, 2])
+    if nearby is not None:
+        nearby.seen(arch, keep, points, np.where(wall > 0, _LEAST * (far - wall - reach), BESIDE))
+    near = np.flatnonzero((wall > 0) & (far < wall + reach))
+    keep, angle, far, radial, wall = keep[near], angle[near], far[near], radial[near], wall[near]
     tangent = np.stack([np.cos(angle), np.sin(angle), np.zeros(len(angle))], axis=1)
-    slope = np.clip(over_angle[keep] / np.maximum(far, 1.0), -0.7, 0.7)
-    rise = np.clip(over_height[keep], -0.7, 0.7)
+    slope = np.clip(over_angle[near] / np.maximum(far, 1.0), -0.7, 0.7)
+    rise = np.clip(over_height[near], -0.7, 0.7)
     n = radial - slope[:, None] * tangent - rise[:, None] * [0.0, 0, 1]
     n /= np.linalg.norm(n, axis=1, keepdims=True)
     missing = (wall + clearance[keep] - far) * np.einsum("ij,ij->i", n, radial)

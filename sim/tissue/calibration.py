@@ -31,7 +31,7 @@ def calibrated(model: Model, table: dict) -> Model:
         rows = m.owner == k
         at = place[m.column[rows] + n]
         force[at, 3 * column : 3 * column + 3] = m.weight[rows, None] * m.direction[rows]
-    moved = factorised(model).solve(force)[free < n].reshape(-1, len(active), 3)
+    moved = factorised(model).solve(force)[free < n].astype(float).reshape(-1, len(active), 3)
     peak = np.sqrt((moved**2).sum(axis=2)).max(axis=0)
     gain = np.array([float(table.get(base_name(m.names[k]), {}).get("gain", 1.5)) for k in active])
     goal, reach = m.excursion[active], m.reach[active]

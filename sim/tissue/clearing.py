@@ -25,6 +25,8 @@ LEAVE, MORE, ROUNDS = 0.02, 0.02, 12
 #: mm that a point is moved in one round, at most; steps to find out how.
 FAR = 0.4
 SWEEPS = 20
+#: Points in too deep up to which dense tables are faster than sparse ones.
+DENSE = 120
 #: mm between points of the lips that may have gone through each other.
 LIP_REACH = 4.0
 _ENAMEL = 0
@@ -66,8 +68,7 @@ def cleared(model: Model, pose, positions) -> np.ndarray:
     n = model.count
     for _ in range(ROUNDS):
         found = surfaces_of(model, pose, out, OFF_BONE)
-        normals = vertex_normals(out[:n], model.contacts.triangles)
-        found["flesh"] = planes_of([flesh_contacts(model.drawn.flesh, out[:n], normals)], n)
+        found["flesh"] = planes_of([flesh_contacts(model.drawn.flesh, out[:n])], n)
         out = project(found.pop("fascia_skull"), out, rounds=1)
         move = way_out(joined(*found.values()), out, model.layers.free[:n])
         if move is None:
@@ -91,11 +92,16 @@ def way_out(planes, positions, free, kept: float = 0.0) -> np.ndarray | None:
 def _least_motion(rows, wanted, free):
     """(n, 3) mm, about the smallest motion of the ``free`` (n,) vertices by which ``rows @ motion`` (c,) is at least
     ``wanted`` (c,): surfaces push, they do not pull, so by projected Jacobi steps on the pushes."""
-    held = rows.data * np.repeat(free, 3)[rows.indices]
-    rows = sparse.csr_matrix((held, rows.indices, rows.indptr), rows.shape)
-    product = (rows @ rows.T).tocsr()
+    used, place = np.unique(rows.indices, return_inverse=True)
+    free = np.repeat(free, 3)
+    near = sparse.csr_matrix((rows.data * free[rows.indices], place, rows.indptr), (len(wanted), len(used)))
+    if len(wanted) < DENSE:
+        near = near.toarray()
+    product = near @ near.T
     size = np.maximum(np.asarray(abs(product).sum(axis=1)).ravel(), 1e-9)
     push = wanted / size
     for _ in range(SWEEPS):
         push = np.maximum(push + (wanted - product @ push) / size, 0)
-    return (rows.T @ push).reshape(-1, 3)
+    move = np.zeros(len(free))
+    move[used] = near.T @ push
+    return move.reshape(-1, 3)

@@ -25,6 +25,8 @@ _LIP_REACH = 6.0
 #: mm farther away for which a point of bone makes up by facing the way that a column stands, not 60 degrees off it; mm, of
 #: both together, beyond which fascia is not held off bone: more than it moves before bone is looked for again.
 _FACING, _BONE_REACH = 12.0, 16.0
+#: mm over bone from which on fascia may come to touch it within a frame.
+NEAR_BONE = 1.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,26 +92,35 @@ def build_surfaces(head: Head, layers: Layers, ties: np.ndarray) -> Surfaces:
     )
 
 
-def bone_planes(model_bones, layers: Layers, fascia: np.ndarray, rotation, translation) -> Planes:
+def bone_planes(model_bones, layers: Layers, fascia: np.ndarray, rotation, translation, nearby=None) -> Planes:
     """Fascia (n, 3) over bone (3.7): the tangent plane of the bone where each node is now, so that it slides along it.
 
     The mandible's columns are looked up in the mandible's own frame. Where the nearest bone faces another way than the
     bone the column stands on (the inside of an orbit, the edge of a plate) there is no contact.
+
+    nearby : `Nearby`; with it, only what is within `NEAR_BONE` mm counts
     """
     node, normal, level = [], [], []
     for bone in model_bones:
         points = fascia[bone.column]
         if bone.lower:
             points = (points - translation) @ rotation
-        stands = layers.bone_normal[bone.column]
-        rows, at, n = bone.under(points, stands, _BONE_REACH)
+        due = slice(None) if nearby is None else nearby.due(bone, points)
+        stands, column, points_due = layers.bone_normal[bone.column[due]], bone.column[due], points[due]
+        rows, at, n = bone.under(points_due, stands, _BONE_REACH)
         keep = np.einsum("ij,ij->i", n, stands[rows]) > 0.5
+        if nearby is not None:
+            height = np.einsum("ij,ij->i", points_due[rows] - at, n) - bone.margin[due][rows]
+            room = np.full(len(points_due), NEAR_BONE)  # where there is no contact as it is now
+            room[rows[keep]] = height[keep] - NEAR_BONE
+            nearby.seen(bone, due, points, room)
+            keep &= height < NEAR_BONE
         rows, at, n = rows[keep], at[keep], n[keep]
         if bone.lower:
             at, n = at @ rotation.T + translation, n @ rotation.T
-        node.append(bone.column[rows] + len(fascia))
+        node.append(column[rows] + len(fascia))
         normal.append(n)
-        level.append(np.einsum("ij,ij->i", at, n) + bone.margin[rows])
+        level.append(np.einsum("ij,ij->i", at, n) + bone.margin[due][rows])
     if not node:
         return empty_planes()
     node, normal, level = (np.concatenate(x) for x in (node, normal, level))

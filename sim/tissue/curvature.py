@@ -44,7 +44,6 @@ class Curvature:
         self._next = (at + 1) % self._memory
         self._steps[at], self._changes[at], self._solved[at] = step.ravel(), change.ravel(), solved.ravel()
         self._across[:, at] = self._steps @ self._changes[at]
-        self._across[at] = self._changes @ self._steps[at]
         self._inner[at] = self._changes @ self._solved[at]
         self._inner[:, at] = self._inner[at]
         k = len(self._order)

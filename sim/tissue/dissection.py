@@ -28,7 +28,6 @@ class Dissection:
         self._inner = int(stops[-1])
         matrix = sparse.csr_matrix(matrix)[self._order][:, self._order]
         self._across = matrix[self._inner :, : self._inner].astype(np.float32)
-        self._back = self._across.T.tocsr()
         schur = matrix[self._inner :, self._inner :].toarray()
         self._blocks = []
         for start, stop in zip(stops[:-1], stops[1:], strict=True):
@@ -36,22 +35,22 @@ class Dissection:
             coupled = matrix[self._inner :, start:stop]
             rows = np.flatnonzero(np.diff(coupled.indptr))
             coupled = coupled[rows]
-            schur[np.ix_(rows, rows)] -= coupled @ (coupled @ inverse).T
-            self._blocks.append((slice(start, stop), inverse.astype(np.float32)))
+            follows = (coupled @ inverse).T
+            schur[np.ix_(rows, rows)] -= coupled @ follows
+            self._blocks.append((slice(start, stop), inverse.astype(np.float32), rows, follows.astype(np.float32)))
         self._schur = np.linalg.inv(schur).astype(np.float32)
 
     def solve(self, right):
         """(m, k): the solution for the columns of ``right`` (m, k)."""
         right = np.take(right, self._order, axis=0).astype(np.float32)
         found = np.empty_like(right)
-        inner = found[: self._inner]
-        for rows, inverse in self._blocks:
-            np.matmul(inverse, right[rows], out=inner[rows])
-        found[self._inner :] = self._schur @ (right[self._inner :] - self._across @ inner)
-        pulled = self._back @ found[self._inner :]
-        for rows, inverse in self._blocks:
-            inner[rows] -= inverse @ pulled[rows]
-        out = np.empty(right.shape, order="F")  # each column by itself, as they are used
+        inner, between = found[: self._inner], found[self._inner :]
+        for block, inverse, _, _ in self._blocks:
+            np.matmul(inverse, right[block], out=inner[block])
+        between[:] = self._schur @ (right[self._inner :] - self._across @ inner)
+        for block, _, rows, follows in self._blocks:  # how a block follows those between that it meets
+            inner[block] -= follows @ between[rows]
+        out = np.empty(right.shape, np.float32, order="F")  # each column by itself, as they are used
         out[self._order] = found
         return out
 

@@ -42,6 +42,11 @@ class Before:
     points: Samples
     clearance: np.ndarray
 
+    @cached_property
+    def of_lids(self):
+        """(k, v) sparse: the share that the lids' own vertices have in the points."""
+        return self.points.rows[:, self.of.column].tocsr()
+
 
 @dataclass(frozen=True, eq=False)
 class Within:
@@ -146,12 +151,12 @@ def _before_teeth(arches, lining: Samples, skin, held) -> tuple[Before, ...]:
     return tuple(out)
 
 
-def drawn_contacts(surfaces: DrawnSurfaces, skin, normals, rotation, translation, gaze_of) -> Planes:
-    """All that the drawn surface of ``skin`` (n, 3) touches; normals (n, 3) of the cage."""
+def drawn_contacts(surfaces: DrawnSurfaces, skin, normals, rotation, translation, gaze_of, nearby=None) -> Planes:
+    """All that the drawn surface of ``skin`` (n, 3) touches; normals (n, 3) of the cage; nearby : `Nearby`."""
     return planes_of(
         [
             *(eye_contacts(before, skin, gaze_of(before.of.side)) for before in surfaces.eyes),
-            *(tooth_contacts(before, skin, rotation, translation) for before in surfaces.teeth),
+            *(tooth_contacts(before, skin, rotation, translation, nearby) for before in surfaces.teeth),
             *lip_contacts(surfaces.lips, skin, normals),
         ],
         len(skin),
@@ -172,26 +177,27 @@ def eye_contacts(before: Before, skin, gaze, most: float = CLEAR):
     return *before.points.along(near, normal), normal @ lids.eye.centre + need
 
 
-def on_the_ball(before: Before, skin, gaze, rounds: int = 6) -> np.ndarray:
-    """(v, 3) mm: the lids' vertices of ``skin`` (n, 3) pushed out until what is drawn of them lies on the eyeball: where
-    lids are to go, so that they need not be held off it."""
+def on_the_ball(before: Before, skin, goal, gaze, rounds: int = 6) -> np.ndarray:
+    """(v, 3) mm: the lids' vertices at ``goal`` (v, 3), those of ``skin`` (n, 3) elsewhere, pushed out until what is drawn of
+    them lies on the eyeball: where lids are to go, so that they need not be held off it."""
     lids, rows = before.of, before.points.rows
-    out = skin.copy()
+    own, out = before.of_lids, goal.copy()
+    others = rows @ skin - own @ skin[lids.column]
     for _ in range(rounds):
-        rel = rows @ out - lids.eye.centre
+        at = own @ out + others
+        rel = at - lids.eye.centre
         size = np.maximum(np.linalg.norm(rel, axis=1), 1e-9)
-        deep = eyeball_radius(lids, rel + lids.eye.centre, gaze) + before.clearance - size
-        hit = np.maximum(deep, 0)
+        hit = np.maximum(eyeball_radius(lids, at, gaze) + before.clearance - size, 0)
         if hit.max(initial=0.0) < 0.02:
             break
-        share = (rows.T @ np.column_stack([(hit / size)[:, None] * rel, hit > 0]))[lids.column]
-        out[lids.column] += 1.5 * share[:, :3] / np.maximum(share[:, 3:], 0.05)
-    return out[lids.column]
+        share = own.T @ np.column_stack([(hit / size)[:, None] * rel, hit > 0])
+        out += 1.5 * share[:, :3] / np.maximum(share[:, 3:], 0.05)
+    return out
 
 
-def tooth_contacts(before: Before, skin, rotation, translation):
+def tooth_contacts(before: Before, skin, rotation, translation, nearby=None):
     """Lips and cheeks in front of a row of teeth; a piece for `planes_of`."""
     points = before.points.at(skin)
-    keep, normal, missing = wall_planes(before.of, points, before.clearance, rotation, translation, REACH)
+    keep, normal, missing = wall_planes(before.of, points, before.clearance, rotation, translation, REACH, nearby)
     level = np.einsum("ij,ij->i", points[keep], normal) + missing
     return *before.points.along(keep, normal), level

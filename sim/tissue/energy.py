@@ -58,13 +58,12 @@ class Pose:
 def posed_reference(model: Model, rotation, translation) -> np.ndarray:
     """(3 n, 3) mm: every node moved by its share with the mandible; the throat sinks besides as the jaw turns down."""
     layers, jaw = model.layers, model.jaw
-    moved = layers.nodes @ rotation.T + translation
-    moved -= layers.nodes
-    moved *= np.concatenate([layers.jaw, layers.jaw, layers.mandible])[:, None]
-    moved += layers.nodes
+    rows, share = layers.carried
+    out, rest = layers.nodes.copy(), layers.nodes[rows]
+    out[rows] += share * (rest @ rotation.T + translation - rest)
     ahead = jaw.incisor - (jaw.condyle_l + jaw.condyle_r) / 2
-    moved[:, 2] += (rotation @ ahead - ahead)[2] * layers.sink
-    return moved
+    out[:, 2] += (rotation @ ahead - ahead)[2] * layers.sink
+    return out
 
 
 def pose_of(model: Model, control: Control, lid_goal: np.ndarray | None = None) -> Pose:
@@ -121,9 +120,8 @@ def load_at(model: Model, around: Surroundings, positions, velocities=None) -> n
 
 def _lid_goal(model: Model, before, closure, gaze) -> np.ndarray:
     """(v, 3) mm: where the lids of one eye are to go, what is drawn of them on the eyeball."""
-    skin = model.layers.nodes[: model.count].copy()
-    skin[before.of.column] = lid_targets(before.of, closure[0], closure[1], gaze) + _lid_offset(model, before.of)
-    return on_the_ball(before, skin, gaze)
+    goal = lid_targets(before.of, closure[0], closure[1], gaze) + _lid_offset(model, before.of)
+    return on_the_ball(before, model.layers.nodes[: model.count], goal, gaze)
 
 
 def _lid_offset(model: Model, lids) -> np.ndarray:
@@ -203,15 +201,19 @@ def _volume_matrix(model: Model):
     return sparse.diags(np.asarray(off.sum(axis=1)).ravel()) - off
 
 
-def find_contacts(model: Model, pose: Pose, positions) -> Planes:
-    """The planes that matter near ``positions`` (3 n, 3)."""
+def find_contacts(model: Model, pose: Pose, positions, nearby=None) -> Planes:
+    """The planes that matter near ``positions`` (3 n, 3).
+
+    nearby : `Nearby`, for positions that follow each other closely: what is far away is looked at more seldom then
+    """
     n = model.count
     skin = positions[:n]
     normals = vertex_normals(skin, _facing(model))
+    jaw = pose.rotation, pose.translation
     return joined(
-        contact.bone_planes(model.contacts.bones, model.layers, positions[n : 2 * n], pose.rotation, pose.translation),
+        contact.bone_planes(model.contacts.bones, model.layers, positions[n : 2 * n], *jaw, nearby),
         contact.sheet_contacts(model.contacts, normals),
-        drawn_contacts(model.drawn, skin, normals, pose.rotation, pose.translation, pose.gaze_of),
+        drawn_contacts(model.drawn, skin, normals, *jaw, pose.gaze_of, nearby),
     )
 
 

@@ -22,11 +22,13 @@ ASIDE = 0.35
 
 @dataclass(frozen=True, eq=False)
 class Flesh:
-    """outer, inner : points of the skin and of the lining across from each (k); least (k,) mm that stays between them."""
+    """outer, inner : points of the skin and of the lining across from each (k); least (k,) mm that stays between them;
+    triangles (t, 3) at the vertices that they depend on."""
 
     outer: Samples
     inner: Samples
     least: np.ndarray
+    triangles: np.ndarray
 
 
 def build_flesh(faces, skin, around, lining) -> Flesh:
@@ -37,8 +39,9 @@ def build_flesh(faces, skin, around, lining) -> Flesh:
     """
     outer, inner = (drawn_samples(faces, skin, around & side, SPACING) for side in (~lining, lining))
     if not len(outer) or not len(inner):
-        return Flesh(outer[:0], inner[:0], np.zeros(0))
-    normals = vertex_normals(skin, short_diagonals(skin, faces))
+        return Flesh(outer[:0], inner[:0], np.zeros(0), np.zeros((0, 3), int))
+    triangles = short_diagonals(skin, faces)
+    normals = vertex_normals(skin, triangles)
     places, behind = outer.at(skin), inner.at(skin)
     out, back = _unit(outer.at(normals)), _unit(inner.at(normals))
     _, near = cKDTree(behind).query(places, k=min(24, len(behind)), distance_upper_bound=DEEP)
@@ -55,11 +58,15 @@ def build_flesh(faces, skin, around, lining) -> Flesh:
     mate = near[kept, best]
     facing = _unit(out[kept] - back[mate])
     least = KEPT * np.einsum("ij,ij->i", way[kept, best], facing)
-    return Flesh(outer[kept], inner[mate], least)
+    outer, inner = outer[kept], inner[mate]
+    used = np.zeros(len(skin), bool)
+    used[outer.rows.indices] = used[inner.rows.indices] = True
+    return Flesh(outer, inner, least, triangles[used[triangles].any(axis=1)])
 
 
-def flesh_contacts(flesh: Flesh, skin, normals):
-    """A piece for `planes_of`: flesh that has become too thin. skin, normals : (n, 3) of the cage."""
+def flesh_contacts(flesh: Flesh, skin):
+    """A piece for `planes_of`: flesh of ``skin`` (n, 3) mm that has become too thin."""
+    normals = vertex_normals(skin, flesh.triangles)
     facing = _unit(_unit(flesh.outer.at(normals)) - _unit(flesh.inner.at(normals)))
     thick = np.einsum("ij,ij->i", flesh.outer.at(skin) - flesh.inner.at(skin), facing)
     thin = np.flatnonzero(thick < flesh.least)

@@ -8,7 +8,6 @@ change of the control.
 
 import numpy as np
 
-from ..mesh import vertex_normals
 from .clearing import cleared, way_out
 from .curvature import Curvature
 from .drawn_contact import CLEAR
@@ -17,11 +16,13 @@ from .energy import Pose, find_contacts, pose_of
 from .flesh import flesh_contacts
 from .forces import Landscape
 from .lid_meeting import met
+from .nearby import Nearby
+from .single import single
 from .solver import descend, factorised, minimise, rest_state
 from .structures import Control, Model, State
 
 #: Steps that a frame is given, and the mm of a step at which fewer do.
-STEPS, TOLERANCE = 6, 0.05
+STEPS, TOLERANCE = 7, 0.05
 #: The mm of a step at which a pose counts as settled.
 SETTLED = 0.01
 #: The last step is taken without a look at the energy behind it if no node moves farther, mm.
@@ -47,9 +48,9 @@ class Frames:
         self.model = model
         self.state = rest_state(model)
         self.residual, self.iterations, self.converged = 0.0, 0, True
-        self._curvature = Curvature()
+        self._curvature, self._nearby = Curvature(), Nearby()
         self._looks = self._lid_goal = None
-        self._at = self._goal = self._asked = None  # where the nodes were, were expected, and the control as mm
+        self._at = self._goal = self._asked = None  # where nodes were, free ones were carried, and the control as mm
         self._off = self._change = None  # by how much they lay elsewhere, and the last change of the control
         self._past = []
 
@@ -78,8 +79,7 @@ class Frames:
                 positions[:n] += out
             elif kept == 0:
                 break
-            normals = vertex_normals(positions[:n], model.contacts.triangles)
-            planes, kept = planes_of([flesh_contacts(model.drawn.flesh, positions[:n], normals)], n), 0.0
+            planes, kept = planes_of([flesh_contacts(model.drawn.flesh, positions[:n])], n), 0.0
         return positions
 
     def _descended(self, pose: Pose, start, steps, tolerance):
@@ -87,7 +87,7 @@ class Frames:
         model, factor = self.model, factorised(self.model)
         if steps > STEPS:
             positions, _, residual, done, planes = minimise(
-                lambda planes: Landscape(model, pose, planes),
+                lambda planes: Landscape(single(model), pose, planes),
                 lambda x: find_contacts(model, pose, x),
                 factor,
                 start,
@@ -97,8 +97,8 @@ class Frames:
                 _TRUST,
             )
             return positions, residual, done, planes
-        planes = find_contacts(model, pose, start)
-        at = Landscape(model, pose, planes)
+        planes = find_contacts(model, pose, start, self._nearby)
+        at = Landscape(single(model), pose, planes)
         q, _, residual, done = descend(at, factor, at.free(start), self._curvature, steps, tolerance, _TRUST)
         return at.positions(q), residual, done, planes
 
@@ -127,12 +127,13 @@ class Frames:
     def _start(self, pose: Pose, asked: np.ndarray) -> np.ndarray:
         """(3 n, 3) mm: where the nodes are likely to come to rest, bone and what is not free in its place."""
         free = self.model.cache["matrix"]["free"]
-        goal = pose.reference.copy()
-        goal[pose.lid_node] = pose.lid_goal
         start = pose.reference.copy()
-        start[free] = goal[free]
+        start[pose.lid_node] = pose.lid_goal
+        goal = start[free]
+        start[pose.lid_node] = pose.reference[pose.lid_node]
+        start[free] = goal
         if self._at is not None:
-            off = (self._at - self._goal)[free]
+            off = self._at[free] - self._goal
             change = asked - self._asked
             if self._off is not None:
                 self._past = [*self._past, (self._change, off - self._off)][-_PAST:]
@@ -152,7 +153,7 @@ class Frames:
             return 0.0
         ridge = _RIDGE * scale / len(changes) * np.eye(len(changes))
         share = np.clip(np.linalg.solve(products + ridge, changes @ change), -_MOST, _MOST)
-        moved = np.tensordot(share, [motion for _, motion in self._past], 1)
+        moved = sum(part * motion for part, (_, motion) in zip(share, self._past, strict=True))
         farthest = np.sqrt(np.einsum("ij,ij->i", moved, moved).max(initial=0.0))
         return moved * min(1.0, _FAR / max(farthest, _FAR))
 

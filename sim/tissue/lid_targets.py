@@ -44,9 +44,7 @@ def lid_targets(lids: Lids, upper: float, lower: float, gaze: np.ndarray) -> np.
     turn = np.where(lids.upper, turn_upper * over - press, turn_lower * over + press)
     angle = lids.elevation + lids.weight * turn
 
-    rest = at_rest(lids) - lids.eye.centre
-    rest_size = np.linalg.norm(rest, axis=1)
-    gap = rest_size - eyeball_radius(lids, lids.eye.centre + rest, np.zeros(2))
+    gap = lids.rest_gap
     # skin that hung in the fold is drawn flat over the ball
     drawn = np.clip(-turn / np.maximum(0.8 * lids.opening, 0.1), 0, 1) * (lids.upper & ~lids.inner)
     drawn = drawn * np.clip(4 * lids.weight * (1 - lids.weight), 0, 1)
@@ -73,9 +71,3 @@ def _lagging(lids: Lids, amount: float):
     if not 0 < amount < 1:
         return amount
     return amount ** (_LAG[0] + (_LAG[1] - _LAG[0]) * lids.middle**2)
-
-
-def at_rest(lids: Lids) -> np.ndarray:
-    """(v, 3) mm, the lid vertices as scanned."""
-    plane = np.cos(lids.elevation)[:, None] * lids.forward + np.sin(lids.elevation)[:, None] * lids.up
-    return lids.eye.centre + lids.along[:, None] * lids.axis + lids.radius[:, None] * plane

@@ -87,9 +87,11 @@ def contact_energy(planes: Planes, positions, stiffness: float) -> tuple[float, 
     return energy, np.stack(gradient, axis=1)
 
 
-def row_energy(planes: Planes, positions, stiffness: float) -> tuple[float, np.ndarray]:
-    """Energy ½ k Σ depth² of the points between nodes, and its gradient over the first m nodes (m, 3)."""
+def row_energy(planes: Planes, positions, stiffness: float) -> tuple[float, np.ndarray | None]:
+    """Energy ½ k Σ depth² of the points between nodes, and its gradient over the first m nodes (m, 3), if there is any."""
     depth = row_depths(planes, positions)
+    if not depth.any():
+        return 0.0, None
     return 0.5 * stiffness * float(depth @ depth), (planes.pushed @ (-stiffness * depth)).reshape(-1, 3)
 
 

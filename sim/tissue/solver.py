@@ -159,10 +159,11 @@ def descend(value, factor, q, curvature, steps, tolerance=0.0, trust=0.0):
         if residual <= tolerance or (count == steps and residual <= trust):
             return q + direction if trust else q, energy, residual, count
         length = min(1.0, 15.0 / residual)  # no node jumps farther than this in one step
+        rounding = np.finfo(gradient.dtype).eps * abs(energy)
         for _ in range(12):
             moved = q + length * direction
             new_energy, new_gradient = value(moved)
-            if new_energy <= energy + 1e-4 * length * slope:
+            if new_energy <= energy + 1e-4 * length * slope + rounding:
                 break
             # the minimum of the parabola through both energies and the slope
             curve = new_energy - energy - length * slope

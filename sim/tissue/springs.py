@@ -80,17 +80,23 @@ def assemble(nodes, first, second, kind, stiffness, stiff, limit) -> Springs:
 
 def spring_forces(springs: Springs, x: np.ndarray, out=None) -> tuple[float, np.ndarray]:
     """Energy and g of each spring (3, s), the force on its first node (3.3); ``x`` (3, k) mm, axis by axis."""
-    d = per_axis(springs.difference, x)
-    length = np.sqrt(np.einsum("ij,ij->j", d, d))
-    stretch = length - springs.rest
-    tension = springs.stiffness * stretch
+    # mode="clip" writes without a buffer; no index is out of range
+    d = x.take(springs.second, axis=1, mode="clip")
+    d -= x.take(springs.first, axis=1, mode="clip")
+    spare = d * d
+    length, stretch, tension = spare
+    length += stretch
+    length += tension
+    np.sqrt(length, out=length)
+    np.subtract(length, springs.rest, out=stretch)
+    np.multiply(springs.stiffness, stretch, out=tension)
     energy = float(tension @ stretch)
     two = springs.biphasic
     beyond = np.maximum(stretch[two] - springs.limit[two] * springs.rest[two], 0)
     extra = (springs.stiff[two] - springs.stiffness[two]) * beyond
     tension[two] += extra
     tension /= np.maximum(length, 1e-9, out=length)
-    return 0.5 * (energy + float(extra @ beyond)), np.multiply(d, tension, out=d if out is None else out)
+    return 0.5 * (energy + float(extra @ beyond)), np.multiply(d, tension, out=spare if out is None else out)
 
 
 def spring_energy(springs: Springs, positions: np.ndarray) -> tuple[float, np.ndarray]:

@@ -2,6 +2,7 @@
 """Model, State, Control, Solution: what is built once, what changes, what is asked for and what came out."""
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -40,6 +41,13 @@ class Layers:
     soften: np.ndarray
     sheet: np.ndarray
     free: np.ndarray
+
+    @cached_property
+    def carried(self) -> tuple[np.ndarray, np.ndarray]:
+        """Nodes (k,) that go with the mandible, and the share (k, 1) by which each does."""
+        share = np.concatenate([self.jaw, self.jaw, self.mandible])
+        rows = np.flatnonzero(share)
+        return rows, share[rows, None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,6 +152,15 @@ class Lids:
     profile: np.ndarray
     edge: Any = None  # lid_edges.LidEdge
     within: np.ndarray | None = None
+
+    @cached_property
+    def rest_gap(self) -> np.ndarray:
+        """(v,) mm that each vertex lies off the eyeball as scanned."""
+        from .eye_surface import eyeball_radius
+
+        plane = np.cos(self.elevation)[:, None] * self.forward + np.sin(self.elevation)[:, None] * self.up
+        rest = self.along[:, None] * self.axis + self.radius[:, None] * plane
+        return np.linalg.norm(rest, axis=1) - eyeball_radius(self, self.eye.centre + rest, np.zeros(2))
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,41 +20,53 @@ def volumes_and_gradients(positions: np.ndarray, prisms: np.ndarray) -> tuple[np
     D the sum of the three connecting vectors, the integral over the sections is V = - D · N / 6,
     N = [e_a x f_a + e_b x f_b + (e_a + e_b) x (f_a + f_b)] / 6.
     """
-    volume, grad = _by_axis(np.ascontiguousarray(positions.T), prisms)
-    return volume, grad.transpose(1, 0, 2)
+    e, f, normal, through = _sections(np.ascontiguousarray(positions.T), prisms)
+    grad = np.empty((3, 2, 3, len(prisms)))
+    volume = _volume(normal, through)
+    _at_corners(e, f, normal, through, grad)
+    return volume, grad.reshape(3, 6, -1).transpose(1, 0, 2)
 
 
-def _by_axis(x: np.ndarray, prisms: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """`volumes_and_gradients` of ``x`` (3, k) mm, axis by axis: volumes (t,) and gradients (3, 6, t)."""
+def _sections(x: np.ndarray, prisms: np.ndarray):
+    """Of prisms (t, 6) of ``x`` (3, k) mm, axis by axis: 2 e_a + e_b and e_a + 2 e_b (3, 2, t), the same of f, 6 N (3, t) and
+    - D / 36 (3, t)."""
     # mode="clip" writes without a buffer; no index is out of range
     p = x.take(prisms.T, axis=1, mode="clip").reshape(3, 2, 3, -1)  # axis, triangle (a, b), corner, prism
     e, f = p[:, :, 1] - p[:, :, 0], p[:, :, 2] - p[:, :, 0]
     sums = p[:, :, 0] + p[:, :, 1]
     sums += p[:, :, 2]
-    through = sums[:, :1] - sums[:, 1:]
+    through = sums[:, 0] - sums[:, 1]
     through /= 36
-    ef = _cross(e, f)
-    e_both, f_both = e[:, :1] + e[:, 1:], f[:, :1] + f[:, 1:]
+    e_both, f_both, each = e[:, 0] + e[:, 1], f[:, 0] + f[:, 1], _cross(e, f)
     normal = _cross(e_both, f_both)
-    normal += ef[:, :1]
-    normal += ef[:, 1:]
-    volume = np.einsum("ikj,ikj->j", normal, through)
+    normal += each[:, 0]
+    normal += each[:, 1]
+    e += e_both[:, None]
+    f += f_both[:, None]
+    return e, f, normal, through
+
+
+def _volume(normal, through):
+    """(t,) mm³, of `_sections`."""
+    return normal[0] * through[0] + normal[1] * through[1] + normal[2] * through[2]
+
+
+def _at_corners(e, f, normal, through, out):
+    """Gradients of the volumes (3, 2, 3, t) into ``out``, of `_sections`; ``normal`` is changed."""
+    through = through[:, None]
+    _cross(f, through, out[:, :, 1])
+    _cross(through, e, out[:, :, 2])
+    np.add(out[:, :, 1], out[:, :, 2], out=out[:, :, 0])
+    np.negative(out[:, :, 0], out=out[:, :, 0])
     normal /= 36
-    e += e_both
-    f += f_both
-    grad = np.empty_like(p)
-    _cross(f, through, grad[:, :, 1])
-    _cross(through, e, grad[:, :, 2])
-    np.add(grad[:, :, 1], grad[:, :, 2], out=grad[:, :, 0])
-    np.negative(grad[:, :, 0], out=grad[:, :, 0])
-    grad[:, 0] += normal
-    grad[:, 1] -= normal
-    return volume, grad.reshape(3, 6, -1)
+    normal = normal[:, None]
+    out[:, 0] += normal
+    out[:, 1] -= normal
 
 
 def _cross(a: np.ndarray, b: np.ndarray, out=None) -> np.ndarray:
     """(3, ...), of the vectors along the first axis of a and b."""
-    out = np.empty(np.broadcast(a, b).shape) if out is None else out
+    out = np.empty(np.broadcast(a, b).shape, a.dtype) if out is None else out
     np.subtract(a[1] * b[2], a[2] * b[1], out=out[0])
     np.subtract(a[2] * b[0], a[0] * b[2], out=out[1])
     np.subtract(a[0] * b[1], a[1] * b[0], out=out[2])
@@ -63,7 +75,7 @@ def _cross(a: np.ndarray, b: np.ndarray, out=None) -> np.ndarray:
 
 def prism_volumes(positions: np.ndarray, prisms: np.ndarray) -> np.ndarray:
     """(t,) mm³ of prisms (t, 6): epidermis triangle, then the fascia triangle below it."""
-    return volumes_and_gradients(positions, prisms)[0]
+    return _volume(*_sections(np.ascontiguousarray(positions.T), prisms)[2:])
 
 
 def corner_gather(prisms: np.ndarray, count: int) -> sparse.csr_matrix:
@@ -78,15 +90,18 @@ def volume_forces(x, prisms, rest_volume, k1, crushed=0.0, hardening=0.0, out=No
     A prism with less than the share ``crushed`` of its volume resists ``hardening`` times more: 3.6 alone has no way to keep
     a prism in a deep fold from turning inside out.
     """
-    volume, grad = _by_axis(x, prisms)
+    e, f, normal, through = _sections(x, prisms)
+    volume = _volume(normal, through)
     missing = np.maximum(crushed * rest_volume - volume, 0)
     volume -= rest_volume
     pressure = k1 * volume / rest_volume
     resistance = hardening * k1 * missing / rest_volume
     energy = 0.5 * float(pressure @ volume + resistance @ missing)
     pressure -= resistance
-    out = np.empty((3, prisms.size)) if out is None else out
-    np.multiply(grad, pressure, out=out.reshape(grad.shape))
+    normal *= pressure
+    through *= pressure
+    out = np.empty((3, prisms.size), x.dtype) if out is None else out
+    _at_corners(e, f, normal, through, out.reshape(3, 2, 3, -1))
     return energy, out
 
 
