@@ -14,6 +14,7 @@ STEPS, DEEP = 60, 25.0  # places looked at from lip to lip; mm looked in front a
 STEP = 2.0  # mm: a step in depth this large from one place to the next is an edge
 EATEN = 1.0  # mm by which a scanner loses an edge beside nothing
 SPECK = 1.2  # mm: a hole no longer than this, with data as deep on both sides, is none
+LIP = 8.0  # mm: what lies deeper than this behind the line from lip to lip is no lip
 ROUGH = 1.0  # mm by which an edge usually strays from a smooth line
 FEWEST = 10  # edges that make a lip
 MIDDLE = 0.3  # shares of the way to the corner up to here tell how wide the mouth is open
@@ -36,7 +37,7 @@ def lip_edges(target: Surface, given, forward, shares):
     for k, (line, behind) in enumerate(zip(lines, depth, strict=True)):
         length = np.linalg.norm(line[-1] - line[0])
         found = first_and_last_edge(behind, int(SPECK / length * STEPS))
-        if found is None:
+        if found is None or any(behind[at] > LIP for at, _ in found):
             continue
         for side, (at, hole) in enumerate(found):
             way = (line[-1] - line[0]) / length * (1 if side == 0 else -1)

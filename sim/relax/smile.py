@@ -3,9 +3,9 @@
 
 A mouth that smiles is wider by 27 %, its corners go outward and up at 47 degrees, and the upper lip is shorter by 28 %
 (Tarantili, Halazonetis and Spyropoulos 2005, The spontaneous smile in dynamic motion, AJO-DO 128:8-15). That was measured
-on smiles as such, against the same person's rest; without it a wide mouth may as well be a person's own. How far back the
-corners go, the other way that they go far (Schutte et al. 2023, The average facial expressions, PRS Global Open 11:e4762),
-our own muscles and jaw tell as they move the corners that far out and up.
+on smiles as such, against the same person's rest; without it a wide mouth may as well be a person's own. Back the corners
+go farthest of all, with the lips closed (Schutte et al. 2023, The average facial expressions, PRS Global Open 11:e4762): as
+far as up is taken for it, and a jaw that opens takes them farther.
 """
 
 import numpy as np
@@ -20,9 +20,7 @@ WIDER, RISE, SHORTER = 0.27, np.radians(47), 0.28
 #: mm: corners go 7 to 22 mm (Paletz, Manktelow and Chaban 1994, The shape of a normal smile), which is a deviation of 3.3 mm,
 #: or of so much along each axis.
 DEVIATION = 2.0
-BACK = 3.0  # mm, the same of what our muscles tell
 UNTOLD = 1e3  # mm: nothing is known along that axis
-PULL = ("zygomaticus_major", "risorius")  # up and out
 SMILE = 0.45  # share of a smile's lift of the corners from which on an expression is one
 CORNERS = ("ch_l", "ch_r")
 
@@ -40,20 +38,11 @@ def told_of_smile(reference: Head, table: Responses, drawn_rows, lip: int, openi
     up = SHORTER * (marks["sn"] - marks["sto"])[2]
     middle = csr_matrix(([1.0], ([0], [lip])), shape=(1, n))
     rows = (vstack([landmark_rows(reference.landmarks, CORNERS, n), middle]) @ drawn_rows).tocsr()
-    corner = np.array([out, 0, out * np.tan(RISE)])
-    corner[1] = back(table, rows[:1], opening, corner)
+    rise = out * np.tan(RISE)
+    corner = np.array([out, rise + (rows[:1] @ table.jaw_at(opening))[0, 1], rise])
     moves = [corner, corner * [-1, 1, 1], [0, 0, up]]
-    sure = [[DEVIATION, BACK, DEVIATION]] * 2 + [[UNTOLD, UNTOLD, DEVIATION]]
+    sure = [[DEVIATION] * 3] * 2 + [[UNTOLD, UNTOLD, DEVIATION]]
     return Told(rows, np.array(moves), np.array(sure))
-
-
-def back(table: Responses, left, opening: float, corner) -> float:
-    """mm that the left corner of the mouth, the row ``left`` (1, n), goes back when the jaw that opens by ``opening`` and our
-    muscles together take it as far out and up as ``corner`` (3,) mm."""
-    jaw = (left @ table.jaw_at(opening))[0]
-    pulls = np.array([(left @ table.fields[table.names.index(f"{name}_l")])[0] for name in PULL])
-    strengths = np.linalg.solve(pulls[:, [0, 2]].T, (corner - jaw)[[0, 2]])
-    return float(jaw[1] + strengths @ pulls[:, 1])
 
 
 def smiles(told: Told, table: Responses, found: Expression) -> bool:
