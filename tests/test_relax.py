@@ -18,10 +18,11 @@ from headshop.sim.progress import finish
 from headshop.sim.relax.bunching import borne, swelling
 from headshop.sim.relax.choice import kept_open, neutral_of, require_choice
 from headshop.sim.relax.explain import explain
-from headshop.sim.relax.mouth_gap import first_and_last_edge
+from headshop.sim.relax.mouth_gap import first_and_last_edge, lip_edges
 from headshop.sim.relax.relaxed import relaxed
 from headshop.sim.relax.responses import MUSCLES, UNPAIRED, responses
-from headshop.sim.relax.smile import smiles, told_of_smile
+from headshop.sim.relax.smile import SMILE as LEAST
+from headshop.sim.relax.smile import lifted, told_of_smile
 from headshop.sim.relax.unlike import MIRROR, unlike
 from headshop.sim.relax.upper_teeth import end_of_teeth, incisal_edge, told_of_stomion
 from headshop.sim.scan.clean import clean_scan
@@ -111,6 +112,17 @@ def test_an_open_mouth_without_a_smile_is_taken_for_none(reference, people):
         assert max(np.linalg.norm(found[corner] - truth[corner]) for corner in CORNERS) < 2
 
 
+def test_corners_that_lie_deep_stay_so_when_the_jaw_alone_was_open(reference, people):
+    marks = reference.landmark_positions()
+    bumps = sum(np.exp(-((reference.skin.vertices - marks[c]) ** 2).sum(axis=1) / (2 * 15.0**2)) for c in CORNERS)
+    for neutral, _ in people:
+        deep = neutral + 6.0 * bumps[:, None] * [0, 1, 0]
+        result = relaxed(reference, deep + responses().jaw_at(0.3), np.ones(len(deep)))
+        truth, found = (marks_on(reference, cage) for cage in (deep, result.skin))
+        assert not result.report["smiles"]
+        assert max(np.linalg.norm(found[corner] - truth[corner]) for corner in CORNERS) < 2
+
+
 def test_what_is_told_of_smiles_is_heeded(reference):
     as_drawn = smoother(reference.skin.faces, len(reference.skin.vertices))[0][: len(reference.skin.vertices)]
     told = told_of_smile(reference, responses(), as_drawn, rest_of(reference).lip_pairs[0, 0], 0.2)
@@ -123,7 +135,9 @@ def test_what_is_told_of_smiles_is_heeded(reference):
     given = (table, reference.skin.vertices, reference.jaw, rows.tocsr(), offsets, people, noise)
     without, heeded = (explain(*given, told=what) for what in (None, told))
     far, near = (np.abs((told.rows @ found.displacement - told.moves)[0, [0, 2]]).max() for found in (without, heeded))
-    assert smiles(told, table, heeded) and near < 0.7 * far
+    assert lifted(told, table, heeded) > LEAST and near < 0.7 * far
+    stronger = told_of_smile(reference, table, as_drawn, rest_of(reference).lip_pairs[0, 0], 0.2, lift=1.3)
+    assert np.all(np.abs(stronger.moves[0]) > np.abs(told.moves[0])) and stronger.moves[2, 2] > told.moves[2, 2]
 
 
 def test_the_same_head_elsewhere_relaxes_to_the_same(reference, people):
@@ -180,6 +194,20 @@ def test_edges_of_lips():
     assert first_and_last_edge(np.concatenate([lip, hole[:1], lip]), 2) is None  # a speck
     crease = np.concatenate([lip, [0.5, 1.5, 2.5, 1.5, 0.5], lip])
     assert first_and_last_edge(crease, 2) is None
+
+
+def test_the_mouths_inside_is_no_lip():
+    def sheet(x, y, z):
+        return [[x[0], y, z[0]], [x[1], y, z[0]], [x[1], y, z[1]], [x[0], y, z[1]]]
+
+    sheets = [sheet((-10, 10), 0, (1, -5)), sheet((-30, 30), 20, (-2, -14)), sheet((-30, 30), 0, (-15, -25))]
+    triangles = np.concatenate([[[4 * k, 4 * k + 1, 4 * k + 2], [4 * k, 4 * k + 2, 4 * k + 3]] for k in range(3)])
+    target = Surface(np.array(np.concatenate(sheets), dtype=float), triangles)
+    given = {"ls": [0, 0, 0], "li": [0, 0, -20], "ch_l": [40, 0, -10], "ch_r": [-40, 0, -10]}
+    given = {name: np.array(place, dtype=float) for name, place in given.items()}
+    edges = lip_edges(target, given, np.array([0, -1.0, 0]), np.array([0.0, 0.1, 0.4]))
+    np.testing.assert_allclose(edges[:2, :, 1], 0, atol=1e-9)
+    assert np.isnan(edges[2]).all()  # no upper lip was scanned there, but what lies behind it
 
 
 def test_the_end_of_the_upper_teeth():

@@ -23,7 +23,7 @@ from .explain import explain
 from .parted import answers
 from .people import covariance
 from .responses import responses
-from .smile import smiles, told_of_smile
+from .smile import CORNERS, SMILE, lifted, told_of_jaw, told_of_smile
 from .upper_teeth import TOLD, told_of_stomion
 
 #: Skin that the muscles and jaw move by less holds the face in place, mm; of it, points this far apart are looked at.
@@ -31,6 +31,7 @@ UNMOVED, COARSE = 0.25, 30.0
 ROUND = 16.0  # mm between the points that are looked at on the cheeks
 NOISE = 1.0  # mm by which a landmark may be wrong
 UNSURE = 0.02  # trust in skin without data, of 1
+ROUNDED = 0.5  # height of an open mouth, of its width, from which on its own muscle rounds it, nobody knows how far
 #: Muscles that press the lips or pull them down: a person's own chin looks too much like what they do; and what purses lips.
 CHIN = ("mentalis", "platysma", "depressor_anguli_oris", "orbicularis_oris_lower")
 NO_SMILE = (*CHIN, "orbicularis_oris_upper")
@@ -90,11 +91,16 @@ def relaxed(reference: Head, skin, fitted, unseen=None, teeth=()) -> Relaxed:
     lip = upper[np.abs(cage[upper, 0]).argmin()]
     found = explain(table, cage, reference.jaw, rows, offsets, people, noise, muscles, known)
     told = told_of_smile(reference, table, as_drawn, lip, found.jaw)
-    smiling = smiles(told, table, found)
-    if smiling:
-        found = explain(table, cage, reference.jaw, rows, offsets, people, noise, of_smile, known, told)
-    out = skin - found.displacement @ matrix.T
     gap = lip_gap(rest, skin)
+    lift = lifted(told, table, found)
+    smiling = lift > SMILE
+    if smiling:
+        told = told_of_smile(reference, table, as_drawn, lip, found.jaw, lift)
+        found = explain(table, cage, reference.jaw, rows, offsets, people, noise, of_smile, known, told)
+    elif gap < ROUNDED * np.linalg.norm(np.subtract(*landmark_rows(reference.landmarks, CORNERS, n) @ now)):
+        told = told_of_jaw(told, table, found.jaw)
+        found = explain(table, cage, reference.jaw, rows, offsets, people, noise, muscles, known, told)
+    out = skin - found.displacement @ matrix.T
     out = lips_rounded(rest, lips_closed(rest, out, matrix), matrix)
     moved = np.linalg.norm(out - skin, axis=1)[~rest.inner]
     strongest = sorted(found.muscles, key=lambda name: (-found.muscles[name], name))
