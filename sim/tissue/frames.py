@@ -126,20 +126,22 @@ class Frames:
 
     def _start(self, pose: Pose, asked: np.ndarray) -> np.ndarray:
         """(3 n, 3) mm: where the nodes are likely to come to rest, bone and what is not free in its place."""
-        free = self.model.cache["matrix"]["free"]
-        start = pose.reference.copy()
-        start[pose.lid_node] = pose.lid_goal
-        goal = start[free]
-        start[pose.lid_node] = pose.reference[pose.lid_node]
-        start[free] = goal
+        fixed = self.model.cache["matrix"]
+        free, row = fixed["free"], fixed["row"][pose.lid_node]
+        goal = pose.reference.take(free, axis=0)
+        moved = row < len(free)
+        goal[row[moved]] = pose.lid_goal[moved]
+        begin = goal
         if self._at is not None:
-            off = self._at[free] - self._goal
+            off = self._at.take(free, axis=0) - self._goal
             change = asked - self._asked
             if self._off is not None:
                 self._past = [*self._past, (self._change, off - self._off)][-_PAST:]
-            start[free] += off + self._foretold(change)
+            begin = goal + off + self._foretold(change)
             self._off, self._change = off, change
         self._goal, self._asked = goal, asked
+        start = pose.reference.copy()
+        start[free] = begin
         return start
 
     def _foretold(self, change: np.ndarray):
