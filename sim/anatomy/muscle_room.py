@@ -118,7 +118,8 @@ def both_ways(faces) -> np.ndarray:
     return np.concatenate(list(diagonals(faces)))
 
 
-def _unit(vectors):
+def unit(vectors):
+    """Vectors (..., 3) of length 1."""
     return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-12)
 
 
@@ -143,7 +144,7 @@ class Samples:
             owner.append(np.repeat(some, len(w)))
         self.points, self._owner = np.round(np.concatenate(points), DIGITS), np.concatenate(owner)
         self._corner, self._bent, self._solid = corner, bent, Triangles(corner)
-        self.normals = _unit(bent.mean(axis=1))[self._owner]
+        self.normals = unit(bent.mean(axis=1))[self._owner]
         self._tree = cKDTree(self.points)
 
     def height(self, points, reach=np.inf, doubt=0.0):
@@ -164,7 +165,7 @@ class Samples:
         weights, distance = self._solid.closest(points, rows, triangle.ravel())
         best = np.round(distance, DIGITS).reshape(-1, count).argmin(axis=1) + count * np.arange(len(points))
         weights, distance, triangle = weights[best], distance[best], triangle.ravel()[best]
-        smooth = _unit(np.einsum("nk,nkd->nd", weights, self._bent[triangle]))
+        smooth = unit(np.einsum("nk,nkd->nd", weights, self._bent[triangle]))
         away = points - np.einsum("nk,nkd->nd", weights, self._corner[triangle])
         side = np.where((away * smooth).sum(1) < doubt * distance, -1.0, 1.0)
         away = np.where(distance[:, None] > 1e-3, away * side[:, None] / np.maximum(distance, 1e-3)[:, None], smooth)

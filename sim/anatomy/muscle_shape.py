@@ -15,7 +15,7 @@ from ..mesh import Mesh
 from ..progress import Work, finish
 from .head import Muscle
 from .muscle_bounds import Belly, bounded, bounding, sheet_normals
-from .muscle_room import Room
+from .muscle_room import Room, unit
 
 #: Share of the belly's thickness at even stations from origin to insertion, where nothing else is asked for.
 SPINDLE = (0.22, 0.72, 1.0, 1.0, 0.72, 0.22)
@@ -149,7 +149,7 @@ def frames(sheet: np.ndarray, ring=False, room: Room | None = None):
     if room is not None:
         outward = room.outward(sheet.reshape(-1, 3)).reshape(sheet.shape)
         normal = normal * (np.sign((outward * normal).sum()) or 1.0)
-    along = _unit(along - (along * normal).sum(-1, keepdims=True) * normal)
+    along = unit(along - (along * normal).sum(-1, keepdims=True) * normal)
     return along, np.cross(normal, along), normal
 
 
@@ -165,10 +165,6 @@ def _refined(values, axis, closed):
         out[::2] = v
         out[1::2] = (9 * (v[:-1] + v[1:]) - ends[: n - 1] - ends[3:]) / 16
     return np.moveaxis(out, 0, axis)
-
-
-def _unit(vectors):
-    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-9)
 
 
 def _length(fibres) -> float:

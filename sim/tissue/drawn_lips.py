@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 
 from ..mesh import vertex_normals
 from .drawn_samples import Samples, drawn_samples
-from .geometry import short_diagonals
+from .geometry import short_diagonals, unit
 
 #: mm between the points of lips at which what is left of penetration is looked for, and the other lip's that are looked at.
 FINE, MANY = 0.5, 6
@@ -52,7 +52,7 @@ def build_lips(faces, skin, weights, free, spacing, mates) -> Lips:
     normals = vertex_normals(skin, short_diagonals(skin, faces))
     least = tuple(np.zeros(len(x)) for x in points)
     joins = tuple(x.rows @ other > 0.02 for x, other in zip(points, weights[::-1], strict=True))
-    flat = [_unit(x.at(normals)) for x in points]
+    flat = [unit(x.at(normals)) for x in points]
     lips = Lips(tuple(points), max(spacing, BESIDE), mates, *_lips_at(points, skin, normals, flat), least, joins)
     for own, _, which, _, _, gap in _across(lips, lips.rest, lips.normals, 0.0, LIP_REACH):
         least[own][which] = gap
@@ -84,10 +84,10 @@ def _across(lips: Lips, places, normals, most, reach):
         distance, mate = distance[which, place], mate[which, place]
         facing = normals[other][mate] - normals[own][which]
         size = np.einsum("ij,ij->i", facing, facing)
-        facing = _unit(facing)
+        facing = unit(facing)
         away = places[own][which] - places[other][mate]
         beside = distance**2 - np.einsum("ij,ij->i", away, facing) ** 2
-        before = _unit(lips.normals[other][mate] - lips.normals[own][which])
+        before = unit(lips.normals[other][mate] - lips.normals[own][which])
         apart = lips.rest[own][which] - lips.rest[other][mate]
         gap = np.einsum("ij,ij->i", apart, before)
         thin = np.maximum(LIP_THIN, BACK_TO_BACK * np.sqrt(np.einsum("ij,ij->i", apart, apart)))
@@ -104,13 +104,9 @@ def _lips_at(points, skin, normals, rest):
     vertices' ``normals`` (n, 3); so too where a crumpled surface has turned over, against its normals at ``rest``."""
     places, out = [x.at(skin) for x in points], []
     for x, at, before in zip(points, places, rest, strict=True):
-        normal = _unit(x.at(normals))
+        normal = unit(x.at(normals))
         if x.fan is not None:
             drawn = x.fan.normals(at, skin)
             normal = np.where(np.einsum("ij,ij->i", drawn, before)[:, None] > TURNED, drawn, normal)
         out.append(normal)
     return places, out
-
-
-def _unit(vectors):
-    return vectors / np.maximum(np.sqrt(np.einsum("ij,ij->i", vectors, vectors)), 1e-9)[:, None]

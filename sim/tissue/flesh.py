@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 from ..mesh import vertex_normals
 from .drawn_samples import Samples, drawn_samples
-from .geometry import short_diagonals
+from .geometry import short_diagonals, unit
 
 #: mm between the points; mm of flesh from which on it is looked after; mm to the lining at most.
 SPACING, THICK, DEEP = 1.6, 1.5, 14.0
@@ -43,7 +43,7 @@ def build_flesh(faces, skin, around, lining) -> Flesh:
     triangles = short_diagonals(skin, faces)
     normals = vertex_normals(skin, triangles)
     places, behind = outer.at(skin), inner.at(skin)
-    out, back = _unit(outer.at(normals)), _unit(inner.at(normals))
+    out, back = unit(outer.at(normals)), unit(inner.at(normals))
     _, near = cKDTree(behind).query(places, k=min(24, len(behind)), distance_upper_bound=DEEP)
     found = near < len(behind)
     near = np.where(found, near, 0)
@@ -56,7 +56,7 @@ def build_flesh(faces, skin, around, lining) -> Flesh:
     kept = np.flatnonzero(np.isfinite(cost[np.arange(len(cost)), best]))
     best = best[kept]
     mate = near[kept, best]
-    facing = _unit(out[kept] - back[mate])
+    facing = unit(out[kept] - back[mate])
     least = KEPT * np.einsum("ij,ij->i", way[kept, best], facing)
     outer, inner = outer[kept], inner[mate]
     used = np.zeros(len(skin), bool)
@@ -67,13 +67,9 @@ def build_flesh(faces, skin, around, lining) -> Flesh:
 def flesh_contacts(flesh: Flesh, skin):
     """A piece for `planes_of`: flesh of ``skin`` (n, 3) mm that has become too thin."""
     normals = vertex_normals(skin, flesh.triangles)
-    facing = _unit(_unit(flesh.outer.at(normals)) - _unit(flesh.inner.at(normals)))
+    facing = unit(unit(flesh.outer.at(normals)) - unit(flesh.inner.at(normals)))
     thick = np.einsum("ij,ij->i", flesh.outer.at(skin) - flesh.inner.at(skin), facing)
     thin = np.flatnonzero(thick < flesh.least)
     both = flesh.outer.along(thin, facing[thin]), flesh.inner.along(thin, -facing[thin])
     column, value = (np.concatenate(pair, axis=1) for pair in zip(*both, strict=True))
     return column, value, flesh.least[thin]
-
-
-def _unit(vectors):
-    return vectors / np.maximum(np.sqrt(np.einsum("ij,ij->i", vectors, vectors)), 1e-9)[:, None]

@@ -107,3 +107,8 @@ def smoothed(values: np.ndarray, laplacian: sparse.spmatrix, area: np.ndarray, l
     matrix = sparse.diags(area) + length**2 * laplacian
     weighted = values * (area if values.ndim == 1 else area[:, None])
     return splu(matrix.tocsc()).solve(np.ascontiguousarray(weighted))
+
+
+def unit(vectors) -> np.ndarray:
+    """Vectors (n, 3) of length 1; what has no length stays as short."""
+    return vectors / np.maximum(np.sqrt(np.einsum("ij,ij->i", vectors, vectors)), 1e-9)[:, None]
