@@ -11,7 +11,7 @@ from headshop.sim.adapt.openings import lid_margins, opening, rims, unlike
 from headshop.sim.adapt.scan_surface import scan_surface
 from headshop.sim.adapt.skin_fit import fit_skin
 from headshop.sim.adapt.sliding import framed, spread_sites
-from headshop.sim.adapt.sliding_warp import SlidingWarp
+from headshop.sim.adapt.sliding_warp import Mirror, SlidingWarp
 from headshop.sim.mesh import Mesh
 from headshop.sim.mesh_subdivision import smoother
 from headshop.sim.progress import finish
@@ -40,7 +40,8 @@ def test_frames_are_turns_that_end_on_the_normal():
     np.testing.assert_allclose(frames[:, 2], normals)
 
 
-def test_equals_the_mean_of_a_gaussian_process(observed):
+@pytest.mark.parametrize("alike", [0.0, sliding_warp.ALIKE])
+def test_equals_the_mean_of_a_gaussian_process(observed, alike):
     marks, goals, frames, noise, sites, places, normals, slack = observed
     points = np.random.default_rng(6).normal(0, 70, (5, 3))
     # One scalar observation after the other, the trend a random field too, of a variance without bounds.
@@ -64,10 +65,38 @@ def test_equals_the_mean_of_a_gaussian_process(observed):
         linear = 1 + a @ b.T / 100**2
         return sliding_warp.AMPLITUDE**2 * (1 + far) * np.exp(-far) + 1e7 * linear
 
-    gram = field(at, at) * (way @ way.T) + np.diag(np.square(deviation))
+    def both(a, b):
+        """(k, 3, m, 3) covariance of all components: with what a place shares with its mirror image."""
+        turn = np.eye(3) - 2 * np.outer(mirror.normal, mirror.normal)
+        image = mirror.point + (b - mirror.point) @ turn
+        far = np.sqrt(3) * cdist(a, image) / sliding_warp.TOGETHER
+        shared = alike * sliding_warp.AMPLITUDE**2 * (1 + far) * np.exp(-far)
+        return np.einsum("km,xy->kxmy", field(a, b), np.eye(3)) + np.einsum("km,xy->kxmy", shared, turn)
+
+    mirror = Mirror(np.array([3.0, -20.0, 8.0]), unit(np.array([[0.9, 0.1, -0.2]]))[0])
+    gram = np.einsum("kx,kxmy,my->km", way, both(at, at), way) + np.diag(np.square(deviation))
     strength = np.linalg.solve(gram, np.array(seen))
-    expected = points + field(points, at) @ (way * strength[:, None])
-    np.testing.assert_allclose(SlidingWarp.fit(*observed).transform(points), expected, atol=2e-3)
+    expected = points + np.einsum("kxmy,my,m->kx", both(points, at), way, strength)
+    warp = SlidingWarp.fit(*observed, mirror if alike else None)
+    np.testing.assert_allclose(warp.transform(points), expected, atol=2e-3)
+
+
+def test_one_side_tells_of_the_other():
+    """A bump on one side is taken to be on the other too."""
+    side = np.array([[60.0, y, z] for y in (-50, 0, 50) for z in (-50, 0, 50)])
+    middle = side * [0, 1, 1]
+    marks, top = np.concatenate([side, middle]), 4  # the one of ``side`` in the middle
+    goals = marks + 6.0 * (np.arange(len(marks)) == top)[:, None] * [1, 0, 0]
+    frames, noise = np.tile(np.eye(3), (len(marks), 1, 1)), np.full(marks.shape, 0.3)
+    nothing = np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0)
+    other = side * [-1, 1, 1]
+
+    def moved(mirror):
+        return SlidingWarp.fit(marks, goals, frames, noise, *nothing, mirror).transform(other) - other
+
+    alone, together = moved(None), moved(Mirror(np.zeros(3), np.array([1.0, 0, 0])))
+    rise = (together - alone) @ [-1, 0, 0]
+    assert rise.argmax() == top and 3.0 < rise[top] < 6.0
 
 
 def test_a_site_slides_along_the_surface_and_holds_across_it(observed):

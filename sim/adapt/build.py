@@ -22,7 +22,8 @@ from .gate import check_against_scan, check_arrangement, check_likeness, check_o
 from .landmarks import require_usable
 from .rest import BONES, rest_of
 from .scan_surface import scan_surface
-from .skin_fit import SkinFit, fit_skin, group
+from .skin_fit import SkinFit, fit_skin
+from .skin_groups import group
 from .vestibules import vestibules
 
 REACH = 20.0  # mm: bone deeper under the skin than this is not measured

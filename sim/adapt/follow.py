@@ -21,7 +21,7 @@ from .mouth import mouth_similarity, with_teeth
 from .muscles import carried_muscles
 from .rest import BONES, TEETH, Rest, rest_of
 from .skin_cover import SkinCover
-from .skin_fit import group
+from .skin_groups import group
 from .thin_plate_spline import similarity
 from .untangle import restored, untangling
 

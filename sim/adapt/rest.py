@@ -18,7 +18,7 @@ from .met_lids import LidSlit
 from .openings import rims, touching_lids
 from .refine import scattered, thinned
 from .skin_cover import SkinCover
-from .skin_fit import group
+from .skin_groups import group
 from .smooth_system import laplacian
 from .thin_plate_spline import System, ThinPlateSpline
 from .untangle import sharp

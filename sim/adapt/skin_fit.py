@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import csr_matrix, vstack
-from scipy.spatial import cKDTree
 
 from ..anatomy.head import Head, SurfacePoints
 from ..anatomy.landmark_names import SKIN
@@ -13,20 +12,18 @@ from ..mesh import vertex_normals
 from ..mesh_subdivision import drawn, undrawn
 from ..progress import Progress, Work
 from .closest import Surface
-from .completion import complete_positions, sigma
+from .completion import complete_positions, mirror_plane, sigma
+from .ears import unseen_ears
 from .fine_fit import Anchors, Fitted, fine_fit
 from .openings import closed_eyes, lid_margins, rim_anchors, rims
 from .refine import Pairs, refine
 from .shut_eyes import with_shut_eyes
+from .skin_groups import group
 from .sliding import slide, spread_sites
+from .sliding_warp import Mirror
 from .thin_plate_spline import ThinPlateSpline, similarity
 
-EAR_MARKS = ("sa", "sba", "pra", "pa", "obs", "obi", "t")
 STIFF = tuple(f"{x}_{s}" for x in ("lid_upper", "lid_lower", "nostril") for s in ("l", "r"))
-MOST_MARKS = 5  # of an ear's own landmarks: with so many it is taken as seen
-AROUND_EAR = 9.0  # mm
-BESIDE_EAR = 6.0  # mm from an ear in its place to data that shows it
-SHOWN = 0.7  # share of an ear with such data from which on it counts as seen
 CARRIED = 60.0  # smoothing of the first warp at a landmark that was not given, mm
 PICKED = 1.0  # the same at a given one, per mm of its uncertainty
 LID_MARKS = ("ps_l", "ps_r", "pi_l", "pi_r")
@@ -61,32 +58,11 @@ class SkinFit:
     lips_closed: Head
 
 
-def group(head: Head, name: str) -> np.ndarray:
-    """(n,) weights of a skin group; zeros where the head has none of that name."""
-    found = head.groups.get(name)
-    return np.zeros(len(head.skin.vertices)) if found is None else np.asarray(found, dtype=float)
-
-
 def landmark_rows(points: SurfacePoints, names, n: int) -> csr_matrix:
     """(k, n) sparse rows that give the named skin landmarks from the skin's vertices."""
     at = [points.names.index(name) for name in names]
     rows = np.repeat(np.arange(len(at)), 3)
     return csr_matrix((points.weights[at].ravel(), (rows, points.corners[at].ravel())), shape=(len(at), n))
-
-
-def seen_ears(reference: Head, given, skin: np.ndarray, target: Surface) -> dict[str, bool]:
-    """Side -> whether that ear is in the scan: most of its own landmarks are ``given``, or some, and most of the ear as
-    warped there (``skin`` (n, 3) mm) has data facing the same way beside it. Under hair only some can be placed."""
-    out = {}
-    for side in ("l", "r"):
-        marks = sum(f"{m}_{side}" in given for m in EAR_MARKS)
-        out[side] = marks >= MOST_MARKS
-        ear = np.flatnonzero(group(reference, f"ear_{side}") > 0.5)
-        if 1 <= marks < MOST_MARKS and len(ear):
-            normal = vertex_normals(skin, reference.skin.triangles)
-            found = target.ranked(skin[ear], normal[ear], BESIDE_EAR, 0.5)
-            out[side] = bool((found.found & ~found.border).mean() > SHOWN)
-    return out
 
 
 def fit_skin(reference: Head, target: Surface, given: dict[str, np.ndarray]) -> Work:
@@ -146,7 +122,9 @@ def fit_skin(reference: Head, target: Surface, given: dict[str, np.ndarray]) -> 
     pairs = Pairs(np.concatenate([rows @ rest, rest[margin]]), aim, UNSURE * give, len(names))
     sites = spread_sites(skin.vertices, calm, group(reference, "face") > 0.5)
     yield Progress(0.25, "Slide over the scan")
-    moved = slide(rest, moved, outer, sites, data, pairs)
+    point, normal = mirror_plane(dict(zip(names, marks, strict=True)))
+    mirror = Mirror(turn @ point + shift, turn @ normal / np.linalg.norm(turn @ normal))
+    moved = slide(rest, moved, outer, sites, data, pairs, mirror)
 
     free, stiffness = freedom(reference, given, rim, unseen)
     weight = np.where(known, [HOLD / sigma(name) ** 2 for name in names], 0.0)
@@ -212,18 +190,6 @@ def refinable(reference: Head, outer: np.ndarray, rim: np.ndarray) -> np.ndarray
     for name in ("ear_l", "ear_r", "nostril_l", "nostril_r"):
         folds |= group(reference, name) > 0.3
     return outer[~folds[outer].any(axis=1)]
-
-
-def unseen_ears(reference: Head, given, skin, target: Surface) -> np.ndarray:
-    """(n,) bool: ears that are not in the scan, and the skin close around them if there is no landmark at all: hair
-    lies there."""
-    out = np.zeros(len(reference.skin.vertices), dtype=bool)
-    for side, seen in seen_ears(reference, given, skin, target).items():
-        ear = group(reference, f"ear_{side}") > 0.3
-        if not seen and ear.any():
-            around = 0.0 if any(f"{m}_{side}" in given for m in EAR_MARKS) else AROUND_EAR
-            out |= cKDTree(reference.skin.vertices[ear]).query(reference.skin.vertices)[0] <= around
-    return out
 
 
 def freedom(reference: Head, given, rim, unseen):

@@ -7,7 +7,7 @@ from scipy.spatial import cKDTree
 from ..mesh import vertex_normals
 from .closest import Surface
 from .refine import Pairs, scattered
-from .sliding_warp import SlidingWarp
+from .sliding_warp import Mirror, SlidingWarp
 
 REACH, AGREE = 12.0, 0.6  # mm from a site to the data that it belongs to, and the cosine between their normals
 SLACK = 0.7  # mm by which a site may miss it, one standard deviation: what is finer is left to the last stage
@@ -24,7 +24,7 @@ def spread_sites(skin, triangles, close) -> np.ndarray:
     return np.concatenate([at[scattered(skin[at], gap)] for at, gap in parts])
 
 
-def slide(rest, skin, outer, sites, target: Surface, pairs: Pairs) -> np.ndarray:
+def slide(rest, skin, outer, sites, target: Surface, pairs: Pairs, mirror: Mirror) -> np.ndarray:
     """``rest`` (n, 3) mm warped to the scan: near the landmarks, and on the data beside the vertices ``sites`` (m,).
 
     Parameters
@@ -33,6 +33,7 @@ def slide(rest, skin, outer, sites, target: Surface, pairs: Pairs) -> np.ndarray
     skin : (n, 3) mm, the same where it lies now, near the scan
     outer : (t, 3) triangles of it that a scanner can see
     pairs : landmarks on ``rest`` and on the target; ``give`` is how unsure each is along the surface, mm
+    mirror : between left and right of ``rest``
     """
     normal = vertex_normals(skin, outer)
     found = target.ranked(skin[sites], normal[sites], REACH, AGREE)
@@ -43,7 +44,8 @@ def slide(rest, skin, outer, sites, target: Surface, pairs: Pairs) -> np.ndarray
     used = np.unique(outer)
     frames = framed(normal[used[cKDTree(skin[used]).query(pairs.target)[1]]])
     noise = pairs.give[:, None] * np.array([1.0, 1.0, ACROSS])
-    warp = SlidingWarp.fit(pairs.source, pairs.target, frames, noise, rest[sites[there]], places, facing, slack)
+    held = pairs.source, pairs.target, frames, noise
+    warp = SlidingWarp.fit(*held, rest[sites[there]], places, facing, slack, mirror)
     return warp.transform(rest)
 
 

@@ -4,7 +4,8 @@
 The nearest place on a scan says how far apart two surfaces are, not which points belong together: such a pair holds
 across the surface, and along it the warp takes what is smoothest (semilandmarks that slide: Bookstein 1997; in three
 dimensions Gunz, Mitteroecker and Bookstein 2005). The displacement is estimated like a random field, a Gaussian process
-with a linear trend (Rasmussen and Williams 2006, equations 2.25 and 2.41), each observation with its own noise.
+with a linear trend (Rasmussen and Williams 2006, equations 2.25 and 2.41), each observation with its own noise. Left and
+right stray alike: what is known of one side of a face tells much of the other.
 """
 
 from dataclasses import dataclass
@@ -17,6 +18,7 @@ from .completion import AMPLITUDE
 from .thin_plate_spline import blocks
 
 TOGETHER = 40.0  # mm over which neighbouring features stray together
+ALIKE = 0.8  # how much of that a place shares with its mirror image
 
 
 def covariance(apart):
@@ -30,10 +32,27 @@ def covariance(apart):
 
 
 @dataclass(frozen=True, eq=False)
+class Mirror:
+    """A plane of symmetry: a ``point`` (3,) mm on it and its unit ``normal`` (3,)."""
+
+    point: np.ndarray
+    normal: np.ndarray
+
+    def places(self, points):
+        """Mirror images (k, 3) of points (k, 3)."""
+        return points - 2 * ((points - self.point) @ self.normal)[:, None] * self.normal
+
+    def ways(self, vectors):
+        """The same of directions (k, 3)."""
+        return vectors - 2 * (vectors @ self.normal)[:, None] * self.normal
+
+
+@dataclass(frozen=True, eq=False)
 class SlidingWarp:
     """A fitted warp: ``SlidingWarp.fit(...)``, then ``.transform(points)``.
 
-    centres (k, 3) mm; weights (k, 3); matrix (3, 3) and shift (3,) mm of the trend, which is added to the point itself
+    centres (k, 3) mm, with their mirror images; weights (k, 3); matrix (3, 3) and shift (3,) mm of the trend, which is
+    added to the point itself
     """
 
     centres: np.ndarray
@@ -42,12 +61,15 @@ class SlidingWarp:
     shift: np.ndarray
 
     @classmethod
-    def fit(cls, marks, goals, frames, noise, sites, places, normals, slack) -> "SlidingWarp":
+    def fit(
+        cls, marks, goals, frames, noise, sites, places, normals, slack, mirror: Mirror | None = None
+    ) -> "SlidingWarp":
         """The warp that takes landmarks ``marks`` (k, 3) near ``goals`` (k, 3), and ``sites`` (m, 3) near the planes
         through ``places`` (m, 3) with unit ``normals`` (m, 3); all mm.
 
         frames (k, 3, 3) : orthonormal rows, the axes along which a landmark is as unsure as ``noise`` (k, 3) says; slack
-        (m,) : the same of a site along its normal; mm, one standard deviation. Four landmarks or more, not coplanar.
+        (m,) : the same of a site along its normal; mm, one standard deviation. Four landmarks or more, not coplanar. mirror :
+        between left and right of ``marks`` and ``sites``; without it neither side tells of the other.
         """
         k, m = len(marks), len(sites)
         at = np.concatenate([marks, sites])
@@ -58,6 +80,8 @@ class SlidingWarp:
         seen = np.einsum("ij,ij->i", np.concatenate([goals - marks, places - sites])[of], way)
         table = covariance(cdist(at, at))[np.ix_(of, of)]
         table *= way @ way.T
+        if mirror:
+            table += ALIKE * covariance(cdist(at, mirror.places(at)))[np.ix_(of, of)] * (way @ mirror.ways(way).T)
         table[np.diag_indices_from(table)] += np.concatenate([noise.ravel(), slack]) ** 2
         terms = np.column_stack([np.ones(k + m), (at - middle) / size])
         trend = (way[:, :, None] * terms[of][:, None]).reshape(len(of), 12)
@@ -67,6 +91,9 @@ class SlidingWarp:
         strength = rest[:, 12] - rest[:, :12] @ linear
         weights = np.zeros((k + m, 3))
         np.add.at(weights, of, way * strength[:, None])
+        if mirror:
+            at = np.concatenate([at, mirror.places(at)])
+            weights = np.concatenate([weights, ALIKE * mirror.ways(weights)])
         linear = linear.reshape(3, 4)
         matrix = linear[:, 1:] / size
         return cls(at, weights, matrix, linear[:, 0] - matrix @ middle)

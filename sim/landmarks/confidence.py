@@ -6,7 +6,7 @@ from scipy.spatial import cKDTree
 
 from ..adapt.closest import Surface
 from ..adapt.completion import sigma
-from ..adapt.skin_fit import EAR_MARKS, MOST_MARKS
+from ..adapt.ears import EAR_MARKS, MOST_MARKS
 from .shape_fit import ShapeFit
 from .shape_space import ShapeSpace
 from .sure import SURE
