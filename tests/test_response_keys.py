@@ -223,6 +223,8 @@ def test_a_response_learnt_from_another_simulation_is_out_of_date(bpy, learnt, r
         (tmp_path / str(number) / "sim/tissue/parameters.py").write_text(text)
         marks.add(engine_mark(tmp_path / str(number)))
     assert len(marks) == 3  # the ends of lines are the system's
+    monkeypatch.setattr("headshop.sim.response.engine.FORMAT", "headshop-response/0")
+    assert engine_mark.__wrapped__() not in marks
 
 
 def test_what_was_learnt_is_appended_with_the_head(bpy, learnt, reference, tmp_path):

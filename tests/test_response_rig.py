@@ -92,6 +92,26 @@ def test_unseen_contractions_of_a_patch(patch):
     np.testing.assert_array_equal(rig.skin(control(model, Pose())), head.skin.vertices)
 
 
+def test_a_rig_plays_one_pose_as_it_plays_many(patch):
+    """At the samples themselves, one by one and all at once, the regression says what the simulation said."""
+    _, model, rig, samples = patch
+    many = rig.own(samples.inputs)
+    for number, row in enumerate(samples.inputs):
+        np.testing.assert_allclose(rig.own(row[None])[0], many[number], atol=1e-4)
+    np.testing.assert_allclose(rig.frame.rest + many, samples.skin, atol=0.1)
+
+
+def test_crowds_are_among_the_samples(reference_model):
+    """All muscles at once, the jaw anywhere in about half of them."""
+    names = reference_model.muscle_names
+    poses = sampling.drawn_poses(names, 140, np.random.default_rng(3))[len(sampling.single_poses(names)) :]
+    skin = set(input_names(names)) & set(names)
+    crowds = [pose for pose in poses if all(pose.values().get(name) for name in skin)]
+    assert len(crowds) >= 60
+    opened = sum(bool(pose.values().get("jaw_open")) for pose in crowds)
+    assert 0.3 < opened / len(crowds) < 0.7
+
+
 def test_a_rig_is_kept_as_bytes(patch):
     head, model, rig, samples = patch
     data = storage.to_bytes(rig, {"one": {"rms_mm": 0.01}})

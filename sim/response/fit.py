@@ -11,11 +11,11 @@ from ..tissue.structures import Model
 from .inputs import OTHERS
 from .jaw_frame import JawFrame
 from .mirror import Seen, seen_twice
-from .rig import Region, Rig, coordinates, matern
+from .rig import SQUARE, Region, Rig, coordinates, matern
 from .sampling import Samples
 from .spending import fit_spending
 
-REGIONS = 24
+REGIONS = 20
 #: mm that a vertex must move in some sample to be in a region at all; mm rms that the modes may lose.
 _STILL, _LOST = 0.01, 0.03
 #: A region feels an input that moves it by this share of what its strongest one does.
@@ -25,8 +25,9 @@ _FELT = 0.002
 _POWER = 0.75
 _MORE = {"jaw_open": 2.0, "jaw_forward": 2.0, "jaw_side": 2.0, "seal": 2.5, "cheeks": 0.8}
 _MORE |= {"lip_upper_forward": 1.7, "lip_lower_forward": 1.7}
-#: Weight of the linear part beside the kernel, and the noise of a sample: shares of the kernel's own variance.
-_LINEAR, _NOISE = 3.0, 3e-5
+#: Weight of the linear part beside the Matérn kernel. Noise of a sample: a share of its own variance, the less it moves the
+#: less it may be off, and a share of that of all.
+_LINEAR, _NOISE, _NOISE_OF_ALL = 3.0, 3e-5, 3e-7
 
 
 def fit_rig(model: Model, samples: Samples, singles: int, opposite: np.ndarray | None = None) -> Work:
@@ -53,7 +54,7 @@ def fit_rig(model: Model, samples: Samples, singles: int, opposite: np.ndarray |
         yield Progress(0.2 + 0.8 * number / len(members), f"Fitting region {number + 1} of {len(members)}")
         scale.append(_scale(felt[:, vertices]))
         regions.append(_fit_region(vertices, bending, forces, seen, scale[-1]))
-    packed = (np.array(x, np.float32) for x in (scale, bending))
+    packed = (np.array(x, np.float32) for x in (scale, bending, forces))
     return Rig(model.muscle_names, spending, frame, sphincters, *packed, tuple(regions))
 
 
@@ -98,11 +99,13 @@ def _fit_region(vertices, bending, forces, seen: Seen, scale) -> Region:
     size = (at**2).sum(axis=1)
     kernel = matern(size[:, None] + size - 2 * at @ at.T)
     rest = matern(size)
-    kernel += _LINEAR * line @ line.T - rest[:, None] * rest
+    product = line @ line.T
+    kernel += _LINEAR * product + SQUARE * product**2 - rest[:, None] * rest
     alike = seen.alike(vertices)
     kernel[np.ix_(seen.real, ~seen.real)] *= alike
     kernel[np.ix_(~seen.real, seen.real)] *= alike
-    kernel[np.diag_indices_from(kernel)] += _NOISE * np.trace(kernel) / len(kernel)
+    own = np.diag(kernel)
+    kernel[np.diag_indices_from(kernel)] += _NOISE * own + _NOISE_OF_ALL * own.mean()
     weights = solve(kernel, motion @ axes, assume_a="pos")
     weights[~seen.real] *= alike
     linear = _LINEAR * scale[:, None] * (line.T @ weights)

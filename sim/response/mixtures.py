@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Mixtures to learn from: muscles few and many at random, and expressions as artists compose them.
+"""Mixtures to learn from: muscles few, many and all at random, and expressions as artists compose them.
 
 Left eye, right eye and mouth hardly meet, so a mixture draws each of them anew: one solve teaches about all three. What
 artists key are shapes on top of each other at any strength, mostly the same on both sides: composed of rows of our own
@@ -65,6 +65,14 @@ def mixed_pose(muscle_names, rng: np.random.Generator) -> Pose:
     if rng.uniform() < _ALIKE:
         values = {name: value for name, value in values.items() if not name.endswith("_r")}
         values |= {name[:-2] + "_r": value for name, value in values.items() if name.endswith("_l")}
+    return within(values)
+
+
+def crowded_pose(muscle_names, rng: np.random.Generator) -> Pose:
+    """All muscles at random, and the jaw anywhere in its range in half of such poses."""
+    values = {name: rng.uniform() for name in muscle_names if base_name(name) not in JAW_MUSCLES}
+    if rng.uniform() < 0.5:
+        values |= {"jaw_open": rng.uniform(), "jaw_forward": rng.uniform(-1, 1), "jaw_side": rng.uniform(-1, 1)}
     return within(values)
 
 

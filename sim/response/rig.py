@@ -3,8 +3,9 @@
 
 Inputs become forces and progress of the muscles (`spending`). The skin's own motion (`jaw_frame`) is linear in the
 forces plus a function of how it bends: kernel ridge regression with a Matérn 3/2 kernel (Rasmussen and Williams 2006,
-4.17 and 2.25; contact makes the response no smoother than that), region by region, each seeing only what moves it, in
-principal modes of what it does. At rest all terms vanish: the neutral face is exactly the scan.
+4.17 and 2.25; contact makes the response no smoother than that) and a little of a quadratic one in the forces, which tells
+of many muscles at once where samples are far between; region by region, each seeing only what moves it, in principal modes
+of what it does. At rest all terms vanish: the neutral face is exactly the scan.
 """
 
 from dataclasses import dataclass
@@ -20,12 +21,16 @@ from .spending import Spending
 LENGTH = 2.5  # of the kernel, in the scaled coordinates of each region
 #: What skin bends with, of a muscle: its progress, and this share of its activation in place of as much of that.
 _ASKED = 0.4
+#: Of the quadratic kernel, beside the Matérn's 1.
+SQUARE = 0.03
 
 
 def matern(squared: np.ndarray) -> np.ndarray:
     """Matérn 3/2 of squared distances (any shape), 1 at 0."""
-    far = np.sqrt(np.maximum(squared, 0.0) * (3 / LENGTH**2))
-    return (1 + far) * np.exp(-far)
+    far = np.sqrt(np.maximum(squared, 0.0) * squared.dtype.type(3 / LENGTH**2))
+    near = np.exp(-far)
+    near += far * near
+    return near
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,8 +50,8 @@ class Region:
 class Rig:
     """muscle_names of the head; sphincters: which of the k muscles that pull on skin are the lips' (-1: none); g regions.
 
-    scale (g, p) weights of what skin bends with, 0 where a region does not feel an input; samples (s, p) what it bent with
-    in the poses it was learnt from
+    scale (g, p) weights of what skin bends with, 0 where a region does not feel an input; samples, pulls (s, p) what it bent
+    with in the poses it was learnt from, and the forces in them
     """
 
     muscle_names: tuple[str, ...]
@@ -55,18 +60,26 @@ class Rig:
     sphincters: tuple[int, int]
     scale: np.ndarray
     samples: np.ndarray
+    pulls: np.ndarray
     regions: tuple[Region, ...]
 
     @cached_property
     def _weight(self) -> np.ndarray:
-        """(g, p) of each squared difference in the squared distance of two poses."""
+        """(g, p) of each squared difference in the squared distance of two poses, and of each product in their product."""
         return np.ascontiguousarray(self.scale**2)
 
     @cached_property
-    def _samples(self) -> tuple[np.ndarray, np.ndarray]:
-        """(p, s) the samples, and the kernel of each with rest (g, 1, s)."""
-        across = np.ascontiguousarray(self.samples.T)
-        return across, matern(self._weight @ across**2)[:, None]
+    def _samples(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """(p, s) what the samples bent with, and their forces, and the kernel of each with rest (g, 1, s)."""
+        across, pulls = np.ascontiguousarray(self.samples.T), np.ascontiguousarray(self.pulls.T)
+        return across, pulls, matern(self._weight @ across**2)[:, None]
+
+    @cached_property
+    def _together(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """All regions' linear parts side by side (p, total m), where each one's begins (g,), and their vertices (total v,)."""
+        linear = np.concatenate([region.linear for region in self.regions], axis=1)
+        first = np.cumsum([0, *(region.linear.shape[1] for region in self.regions)])
+        return linear, first, np.concatenate([region.vertices for region in self.regions])
 
     def skin(self, control: Control) -> np.ndarray:
         """(n, 3) mm, the skin in a pose."""
@@ -79,17 +92,27 @@ class Rig:
     def own(self, inputs: np.ndarray) -> np.ndarray:
         """(f, n, 3) mm: the skin's own motion for f rows of inputs (f, p)."""
         forces, bending = (x.astype(np.float32) for x in coordinates(self.spending, self.sphincters, inputs))
+        linear, first, vertices = self._together
+        modes = forces @ linear
+        moved = []
+        for region, kernel, at in zip(self.regions, self._kernels(forces, bending), first, strict=False):
+            amount = kernel @ region.weights
+            amount += modes[:, at : at + amount.shape[1]]
+            moved.append(amount @ region.modes)
         out = np.zeros((len(inputs), len(self.frame.rest), 3), np.float32)
-        for region, kernel in zip(self.regions, self._kernels(bending), strict=True):
-            moved = (kernel @ region.weights + forces @ region.linear) @ region.modes
-            out[:, region.vertices] = moved.reshape(len(inputs), -1, 3)
+        out[:, vertices] = np.concatenate(moved, axis=1).reshape(len(inputs), -1, 3)
         return out
 
-    def _kernels(self, bending: np.ndarray) -> np.ndarray:
+    def _kernels(self, forces: np.ndarray, bending: np.ndarray) -> np.ndarray:
         """(g, f, s) kernel of every pose with every sample as each region sees them, less what either has with rest."""
-        across, rest = self._samples
-        squared = np.stack([self._weight @ (across - at[:, None]) ** 2 for at in bending], axis=1)
-        return matern(squared) - matern(self._weight @ (bending**2).T)[..., None] * rest
+        across, pulls, rest = self._samples
+        out = matern(np.stack([self._weight @ (across - at[:, None]) ** 2 for at in bending], axis=1))
+        out -= matern(self._weight @ (bending**2).T)[..., None] * rest
+        product = np.stack([(self._weight * at) @ pulls for at in forces], axis=1)
+        product *= product
+        product *= np.float32(SQUARE)
+        out += product
+        return out
 
 
 def coordinates(spending: Spending, sphincters, inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -12,14 +12,14 @@ from .jaw_frame import JawFrame
 from .rig import Region, Rig
 from .spending import Spending
 
-FORMAT = "headshop-response/3"
+FORMAT = "headshop-response/4"
 
 
 def to_bytes(rig: Rig, accuracy: dict | None = None) -> bytes:
     """The rig as an ``.npz`` archive (same rig, same bytes); ``accuracy`` is what `accuracy.measured` found of it."""
     about = {"format": FORMAT, "muscles": rig.muscle_names, "sphincters": rig.sphincters, "accuracy": accuracy or {}}
     arrays = {"about": np.array(json.dumps(about)), "mutual": rig.spending.mutual, "beside": rig.spending.beside}
-    arrays |= {"scale": rig.scale, "samples": rig.samples, "jaw": rig.frame.share}
+    arrays |= {"scale": rig.scale, "samples": rig.samples, "pulls": rig.pulls, "jaw": rig.frame.share}
     for number, region in enumerate(rig.regions):
         for field in ("vertices", "weights", "linear", "modes"):
             arrays[f"region.{number}.{field}"] = getattr(region, field)
@@ -58,6 +58,7 @@ def from_bytes(data: bytes, head: Head) -> tuple[Rig, dict]:
         tuple(about["sphincters"]),
         arrays["scale"],
         arrays["samples"],
+        arrays["pulls"],
         tuple(regions),
     )
     return rig, about["accuracy"]
