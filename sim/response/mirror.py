@@ -16,7 +16,7 @@ from ..anatomy.storage import load_head
 from .inputs import input_names
 
 #: Samples and images at most: a pose of the rig takes as much longer as there are more.
-MOST = 1750
+MOST = 1600
 
 
 @dataclass(frozen=True, eq=False)
