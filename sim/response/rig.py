@@ -69,10 +69,12 @@ class Rig:
         return np.ascontiguousarray(self.scale**2)
 
     @cached_property
-    def _samples(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """(p, s) what the samples bent with, and their forces, and the kernel of each with rest (g, 1, s)."""
+    def _samples(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """(p, s) what the samples bent with, and their forces; (g, 1, s) the squared distance of each from rest, and its kernel
+        with rest."""
         across, pulls = np.ascontiguousarray(self.samples.T), np.ascontiguousarray(self.pulls.T)
-        return across, pulls, matern(self._weight @ across**2)[:, None]
+        far = (self._weight @ across**2)[:, None]
+        return across, pulls, far, matern(far)
 
     @cached_property
     def _together(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -105,9 +107,10 @@ class Rig:
 
     def _kernels(self, forces: np.ndarray, bending: np.ndarray) -> np.ndarray:
         """(g, f, s) kernel of every pose with every sample as each region sees them, less what either has with rest."""
-        across, pulls, rest = self._samples
-        out = matern(np.stack([self._weight @ (across - at[:, None]) ** 2 for at in bending], axis=1))
-        out -= matern(self._weight @ (bending**2).T)[..., None] * rest
+        across, pulls, far, rest = self._samples
+        size = (self._weight @ (bending**2).T)[..., None]
+        out = matern(far + size - 2 * np.stack([(self._weight * at) @ across for at in bending], axis=1))
+        out -= matern(size) * rest
         product = np.stack([(self._weight * at) @ pulls for at in forces], axis=1)
         product *= product
         product *= np.float32(SQUARE)

@@ -15,10 +15,11 @@ from .mixtures import SIGNED, channels, composed_pose, crowded_pose, mixed_pose
 from .spending import progress_of
 
 #: Mixtures by how carefully a head is sampled.
-COUNTS = {"quick": 350, "normal": 980, "fine": 1660}
+COUNTS = {"quick": 350, "normal": 1260, "fine": 1660}
 #: What mixtures are, by turns. All muscles at once fill a space of far more dimensions than what people do, so that they are
 #: the most: with none of them a pose of all muscles is off by twice as much as with these.
-_TURNS = (crowded_pose, mixed_pose, composed_pose, crowded_pose, mixed_pose, composed_pose, crowded_pose)
+_TURNS = (crowded_pose, mixed_pose, composed_pose, crowded_pose, composed_pose)
+_TURNS += (crowded_pose, mixed_pose, composed_pose, crowded_pose)
 #: Solver iterations at most, and the step (mm) at which a sample counts as at rest. Under the chin of a wide open mouth skin
 #: goes on in small steps for whole millimetres: at 0.05 mm samples were given up as much as 10 mm from rest.
 ITERATIONS, TOLERANCE = 200, 0.01
