@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A head's response rig, kept on its skin: learnt from the simulation once, then a pose takes a millisecond.
+"""A head's response rig, kept on its skin: learnt from the simulation once, then a pose takes about a millisecond.
 
 The ID property ``headshop_response`` holds its bytes and ``headshop_response_of`` the fingerprint of the head and of the
 simulation that it was learnt from; reshaping the head makes it out of date, and so does a version that simulates otherwise.

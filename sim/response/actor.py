@@ -41,7 +41,7 @@ class Actor:
         return Skin(self.rig.frame.rest.copy())
 
     def state(self, control: Control) -> Skin:
-        """The skin in a pose, within a millisecond."""
+        """The skin in a pose, in about a millisecond."""
         return Skin(self.rig.skin(control))
 
 

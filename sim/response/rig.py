@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The response rig: the skin of a head in any pose within a millisecond, learnt from the simulation.
+"""The response rig: the skin of a head in any pose in about a millisecond, learnt from the simulation.
 
 Inputs become forces and progress of the muscles (`spending`). The skin's own motion (`jaw_frame`) is linear in the
 forces plus a function of how it bends: kernel ridge regression with a Matérn 3/2 kernel (Rasmussen and Williams 2006,

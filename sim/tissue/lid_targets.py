@@ -44,7 +44,7 @@ def lid_targets(lids: Lids, upper: float, lower: float, gaze: np.ndarray) -> np.
     turn = np.where(lids.upper, turn_upper * over - press, turn_lower * over + press)
     angle = lids.elevation + lids.weight * turn
 
-    gap = lids.rest_gap
+    gap = lids.gap
     # skin that hung in the fold is drawn flat over the ball
     drawn = np.clip(-turn / np.maximum(0.8 * lids.opening, 0.1), 0, 1) * (lids.upper & ~lids.inner)
     drawn = drawn * np.clip(4 * lids.weight * (1 - lids.weight), 0, 1)

@@ -100,9 +100,8 @@ def build_lids(head: Head, layers: Layers, side: str) -> Lids | None:
     profile_angle, profile = eye_profile(eye)
     distance = np.linalg.norm(v - eye.centre, axis=1)
     touching = np.flatnonzero((distance < 1.6 * eye.radius) & layers.free[: len(v)])
-    rel = v[touching] - eye.centre
-    angle = np.arccos(np.clip(rel @ eye.gaze / np.maximum(distance[touching], 1e-9), -1, 1))
-    clearance = np.minimum(distance[touching] - np.interp(angle, profile_angle, profile), 0.15)
+    angle = np.arccos(np.clip((v - eye.centre) @ eye.gaze / np.maximum(distance, 1e-9), -1, 1))
+    gap = distance - np.interp(angle, profile_angle, profile)
     lids = Lids(
         side=side,
         eye=eye,
@@ -124,8 +123,9 @@ def build_lids(head: Head, layers: Layers, side: str) -> Lids | None:
         lower_share=lower_share(within, corners, *curves, eye.radius),
         relief=np.zeros((len(column), 3)),
         seal=np.zeros(len(column)),
+        gap=gap[column],
         contact_column=touching,
-        clearance=clearance,
+        clearance=np.minimum(gap[touching], 0.15),
         profile_angle=profile_angle,
         profile=profile,
     )

@@ -121,6 +121,7 @@ class Lids:
     middle : (v,) 0 at the corners of the eye, 1 between them
     lower_share (v,) share of the opening that the lower lid covers in a blink
     relief (v, 3) mm by which shut lids lie otherwise than plain turning would have it
+    gap (v,) mm that each vertex lies off the eyeball at rest
     seal (v,) rad by which each lid goes on when closed, until the limit surfaces meet
     edge : `lid_edges.LidEdge`, the drawn edges, or None; within (v,) mm along the lid where each vertex meets the other lid
     profile : (b,) eyeball radius over the angle from the gaze, `profile_angle` (b,)
@@ -146,21 +147,13 @@ class Lids:
     lower_share: np.ndarray
     relief: np.ndarray
     seal: np.ndarray
+    gap: np.ndarray
     contact_column: np.ndarray
     clearance: np.ndarray
     profile_angle: np.ndarray
     profile: np.ndarray
     edge: Any = None  # lid_edges.LidEdge
     within: np.ndarray | None = None
-
-    @cached_property
-    def rest_gap(self) -> np.ndarray:
-        """(v,) mm that each vertex lies off the eyeball as scanned."""
-        from .eye_surface import eyeball_radius
-
-        plane = np.cos(self.elevation)[:, None] * self.forward + np.sin(self.elevation)[:, None] * self.up
-        rest = self.along[:, None] * self.axis + self.radius[:, None] * plane
-        return np.linalg.norm(rest, axis=1) - eyeball_radius(self, self.eye.centre + rest, np.zeros(2))
 
 
 @dataclass(frozen=True, eq=False)
