@@ -18,7 +18,7 @@ endif
 PY := $(VENV)/bin/python
 READY := $(VENV)/.ready
 
-# Several threads of linear algebra sum in another order: strengths would differ in their last digits.
+# Several threads of linear algebra sum in another order: last digits may differ.
 ONE := OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1
 
 .PHONY: demo test check assets sheets extension bench clean

@@ -58,7 +58,9 @@ def measured_gains(model: Model, table: dict, rounds: int = 3) -> dict[str, floa
         state = None
         share = np.clip(1 - m.excursion[k] / m.reach[k], 0.1, 1)
         for _ in range(rounds):
-            solution = solve(replace(model, muscles=replace(m, strength=strength)), control, state)
+            trial = replace(model, muscles=replace(m, strength=strength))
+            # wholly at rest: short of it rounding decides by how much, and gains would differ from one processor to the next
+            solution = solve(trial, control, state, max_iterations=300, tolerance=1e-3)
             state = solution.state
             peak = max(solution.diagnostics["peak_mm"], 0.05)
             # force needed at the goal, to first order in what is missing (a spent muscle pulls less)
