@@ -3,6 +3,7 @@
 
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from headshop.sim.adapt.build import build_head, fit_report
@@ -13,7 +14,8 @@ from headshop.sim.adapt.landmarks import read_landmarks
 from headshop.sim.adapt.openings import rims
 from headshop.sim.adapt.rest import rest_of
 from headshop.sim.adapt.skin_fit import fit_skin
-from headshop.sim.adapt.untangle import untangled
+from headshop.sim.adapt.thin_plate_spline import similarity
+from headshop.sim.adapt.untangle import restored, untangled
 from headshop.sim.anatomy.eyeball import BALL
 from headshop.sim.anatomy.inside import winding_number
 from headshop.sim.anatomy.landmark_names import mirrored
@@ -123,6 +125,23 @@ def test_tangles_are_found_and_undone(reference):
     mended = untangled(rest_of(reference), pushed, np.zeros(len(pushed), dtype=bool))
     assert len(self_piercings(mended, skin.triangles)) == 0
     assert np.linalg.norm(mended - skin.vertices, axis=1).max() < 3
+
+
+def test_an_ear_under_hair_keeps_its_shape(reference):
+    skin = reference.skin
+    ears = np.maximum(*(np.asarray(reference.groups[f"ear_{s}"], dtype=float) for s in "lr"))
+    unseen = cKDTree(skin.vertices[ears > 0.5]).query(skin.vertices)[0] < 15.0
+    x, y, z = skin.vertices.T
+    out = skin.vertices.copy()  # hair stands out, the more the farther back and up
+    out[:, 0] += np.sign(x) * np.clip(0.5 * (y + 0.6 * z), 0, 25) * (1 + 0.3 * np.sin(z / 8))
+    mended = restored(rest_of(reference), out, unseen, 1.05, ears)
+    np.testing.assert_array_equal(mended[~unseen], out[~unseen])
+    for sign in (-1, 1):
+        ear = np.flatnonzero((ears > 0.5) & (sign * x > 0))
+        turn, shift = similarity(skin.vertices[ear], mended[ear])
+        off = np.linalg.norm(skin.vertices[ear] @ turn.T + shift - mended[ear], axis=1)
+        assert np.cbrt(np.linalg.det(turn)) == pytest.approx(1.05, abs=0.01) and off.max() < 0.5
+    assert len(self_piercings(drawn(skin.faces, mended), skin.triangles)) == 0
 
 
 def test_lips_stay_together_and_lids_on_the_eyes(reference, built):

@@ -92,7 +92,7 @@ def follow(
     yield Progress(0.45, "Untangle the skin")
     lining = np.maximum(group(reference, "lip_upper"), group(reference, "lip_lower")) > 0.3
     shut = (rest.rim | seen) & lining  # lips and where they meet are seen, a fold behind them is not
-    final = restored(rest, final, unseen, scale)
+    final = restored(rest, final, unseen, scale, np.maximum(group(reference, "ear_l"), group(reference, "ear_r")))
     final = yield from portion(untangling(rest, final, seen & ~unseen, shut), 0.45, 0.55)
     final = lips_parted(rest, final, size)
     for eye, side in zip(eyes, "lr", strict=True):

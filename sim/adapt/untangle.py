@@ -8,6 +8,7 @@ fits the surroundings, in a patch that grows until the tangle is gone.
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.sparse import diags
 from scipy.sparse.csgraph import connected_components
 
 from ..mesh_piercing import self_piercings
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 
 FOLD = np.cos(np.radians(150))  # neighbouring triangles that turn back on each other more sharply than this are a fold
 MOST = 5.0  # mm that untangling may move what is seen
+WHOLE = 3.0  # pull, against bending, on what stays in one piece
 
 
 def sharp(vertices, triangles):
@@ -101,25 +103,29 @@ def untangling(rest: "Rest", vertices, visible, hold=None, rounds: int = 6) -> W
     return best
 
 
-def restored(rest: "Rest", vertices, patch, scale=None):
+def restored(rest: "Rest", vertices, patch, scale=None, whole=None):
     """Vertices (n, 3) with the reference's own shape where ``patch`` (n,) bool, fitted to what surrounds it.
 
-    ``scale`` : size of the head relative to the reference, if the patch is to have that and not its surroundings' own.
+    Parameters
+    ----------
+    scale : size of the head relative to the reference, if the patch is to have that and not its surroundings' own
+    whole : (n,) 0..1, what of the patch stays in one piece (None: nothing): it turns as the surroundings do in the mean
+        and keeps its root on them. An ear hangs on a narrow strip; what bends that would crumple all of it.
     """
     out = np.array(vertices, dtype=float)
     if patch.any():
-        _fill_all(rest, out, patch, scale)
+        _fill_all(rest, out, patch, scale, whole)
     return out
 
 
-def _fill_all(rest, out, patch, scale=None):
+def _fill_all(rest, out, patch, scale=None, whole=None):
     _, label = connected_components(rest.link[patch][:, patch], directed=False)
     rows = np.flatnonzero(patch)
     for k in range(label.max() + 1):
-        _fill(rest, out, rows[label == k], scale)
+        _fill(rest, out, rows[label == k], scale, whole)
 
 
-def _fill(rest, out, rows, scale):
+def _fill(rest, out, rows, scale, whole):
     """Replace the vertices ``rows`` of ``out`` by the smoothest continuation of what surrounds them."""
     reference, energy = rest.head.skin.vertices, rest.energy
     near = np.zeros(len(out), dtype=bool)
@@ -134,5 +140,11 @@ def _fill(rest, out, rows, scale):
         shift = shift + (matrix - smaller) @ reference[ring].mean(axis=0)
         matrix = smaller
     base = reference @ matrix.T + shift
-    right = -(energy[rows][:, ring] @ (out - base)[ring])
-    out[rows] = base[rows] + factorised(energy[rows][:, rows])(right)
+    bending, right = energy[rows][:, rows], -(energy[rows][:, ring] @ (out - base)[ring])
+    move = factorised(bending)(right)
+    piece = np.zeros(len(out)) if whole is None else np.where(inside, whole, 0.0)
+    root = ((piece > 0.5) & (rest.link @ (piece <= 0.5).astype(float) > 0))[rows]
+    if root.any():
+        pull = WHOLE * piece[rows][:, None]
+        move = factorised(bending + diags(pull.ravel()))(right + pull * move[root].mean(axis=0))
+    out[rows] = base[rows] + move
