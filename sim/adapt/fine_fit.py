@@ -96,10 +96,12 @@ def fine_fit(cage, faces, free, rim, target: Surface, anchors: Anchors, stiffnes
     stiff = [step for step in rounds if step[0] >= FINE]
     moved = np.zeros((n, 3))
     for turn, step in enumerate(stiff):
+        smooth.factor = None  # each is far softer than the one before
         moved, _ = nearer(base, moved, own, tracked, anchors, smooth, step)
         yield (turn + 1) / turns
     base = undrawn(faces, base + moved, base + moved)
     moved = np.zeros((n, 3))
+    smooth.factor = None
     anchors = replace(anchors, sampling=(anchors.sampling @ surface.rows[:n]).tocsr())
     soft = list(rounds[len(stiff) :])
     for turn, step in enumerate(soft + soft[-1:] * AGAIN):
@@ -111,10 +113,13 @@ def fine_fit(cage, faces, free, rim, target: Surface, anchors: Anchors, stiffnes
     now = surface.rows @ cage
     vertices = now[:n]
     normal = vertex_normals(now, surface.outer)[:n]
-    found, trust = matches(np.arange(n), vertices, normal, tracked, 3.0)
-    trust[~free] = 0
-    gap = np.einsum("ij,ij->i", vertices - found.points, found.normals)
-    return Fitted(cage, vertices, np.clip(trust, 0, 1), np.where(free & (trust > 0), gap, np.nan))
+    look = np.flatnonzero(free)
+    found, sure = matches(look, vertices[look], normal[look], tracked, 3.0)
+    trust, gap = np.zeros(n), np.full(n, np.nan)
+    trust[look] = np.clip(sure, 0, 1)
+    some = sure > 0
+    gap[look[some]] = np.einsum("ij,ij->i", vertices[look[some]] - found.points[some], found.normals[some])
+    return Fitted(cage, vertices, trust, gap)
 
 
 def nearer(base, moved, surface: DrawnPoints, tracked: Tracked, anchors: Anchors, smooth: Smoothness, step):
@@ -145,7 +150,7 @@ def nearer(base, moved, surface: DrawnPoints, tracked: Tracked, anchors: Anchors
     pulls = facing * np.einsum("ij,ij->i", facing, goal)[:, None] + along[:, None] * goal
     sampling = vstack([rows, anchors.sampling]).tocsr()
     pulls *= weight[:, None]
-    moved = solve_displacement(smooth.matrix(soft), sampling, weight, facing, along, pulls, moved)
+    moved = solve_displacement(smooth, soft, sampling, weight, facing, along, pulls, moved)
     worse = folded(surface.rows @ base, surface.rows @ (base + moved), surface.triangles)
     if worse.any():
         at = np.zeros(len(now))

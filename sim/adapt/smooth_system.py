@@ -54,6 +54,9 @@ class Smoothness:
     """The energy ``u^T matrix u`` of a displacement over a mesh, with parts that are stiffer than others.
 
     vertices (n, 3) mm, faces (m, 3 or 4); stiffness (n,) : factor on the energy of bending
+
+    factor : solver of the last system made with it, which preconditions those that are much like it; None if there is
+        none
     """
 
     def __init__(self, vertices, faces, stiffness):
@@ -64,6 +67,7 @@ class Smoothness:
 
     def _weigh(self):
         self._bending = (self._bend.T @ diags(self._stiffness) @ self._bend).tocsr()
+        self.factor = None
 
     def matrix(self, soft: float) -> csr_matrix:
         """(n, n) with the energy of bending times ``soft``."""
@@ -88,21 +92,25 @@ def factorised(matrix):
     ).solve
 
 
-def solve_displacement(smooth, sampling, weight, normals, along, pulls, start):
+def solve_displacement(smoothness: Smoothness, soft, sampling, weight, normals, along, pulls, start):
     """The displacement (n, 3) that minimises ``u^T smooth u + sum_s (S u - g)_s^T W_s (S u - g)_s``.
 
-    smooth (n, n) the same for x, y, z; sampling S (s, n); W_s = weight (normal normal^T + along 1) of weight (s,),
-    normals (s, 3), zero for a point that is pulled alike every way, and along (s,); pulls W g (s, 3), mm; start (n, 3) a
-    first guess. Solved by conjugate gradients, preconditioned with the factorised system whose W are all isotropic: a
-    few steps, and each axis alone in the factor.
+    smooth (n, n) : that of ``smoothness`` when it is so ``soft``, the same for x, y, z; sampling S (s, n); W_s = weight
+    (normal normal^T + along 1) of weight (s,), normals (s, 3), zero for a point that is pulled alike every way, and along
+    (s,); pulls W g (s, 3), mm; start (n, 3) a first guess. Solved by conjugate gradients, preconditioned with a
+    factorised system whose W are all isotropic: a few steps, and each axis alone in the factor. It is that of an earlier
+    call where ``smoothness`` has one.
     """
+    smooth = smoothness.matrix(soft)
     n = sampling.shape[1]
     across = sampling.T.tocsr()
     right = across @ pulls
-    # Between the pull along normals (full) and along the surface (weak): their mean preconditions both.
-    trace = weight * ((normals**2).sum(axis=1) / 3 + along)
-    rough = smooth + across @ diags(trace) @ sampling
-    precondition = factorised(rough + 1e-9 * identity(n))
+    if smoothness.factor is None:
+        # Between the pull along normals (full) and along the surface (weak): their mean preconditions both.
+        trace = weight * ((normals**2).sum(axis=1) / 3 + along)
+        rough = smooth + across @ diags(trace) @ sampling
+        smoothness.factor = factorised(rough + 1e-9 * identity(n))
+    precondition = smoothness.factor
     normals, flat = normals * np.sqrt(weight)[:, None], (weight * along)[:, None]
 
     def apply(x):

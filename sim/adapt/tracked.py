@@ -2,7 +2,8 @@
 """The best places on a surface for points that are asked for again and again and move little in between.
 
 As in molecular dynamics (Verlet 1967): the triangles near a point are looked up once and kept until the point has moved
-by a good part of the distance that was looked at.
+by a good part of the distance that was looked at. A point that lies on the triangle that was best before needs not even
+those.
 """
 
 import numpy as np
@@ -13,6 +14,8 @@ from .ranking import Ranking
 FEW, MANY = 8, 32  # nearest samples that are looked up for a point, and where those do not show a place beyond doubt
 SLACK = 0.2  # share of the distance looked at by which a point may move before it is looked at anew
 FARTHEST = 1.0  # mm that it may move in any case
+SURE = 0.1  # mm: a perpendicular no longer than this shows the place. Farther off points would stick to old triangles
+BLIND = 0.5  # share of how far triangles usually reach from their samples by which one not looked up may lie nearer
 
 
 class Tracked:
@@ -31,18 +34,24 @@ class Tracked:
 
         A triangle much larger than others may be overlooked. ``reach`` must not grow from one time to the next.
         """
-        cover = self.target.cover
-        moved = np.linalg.norm(points - self._at[rows], axis=1)
-        stale = np.flatnonzero(~(moved <= np.minimum(SLACK * self._seen[rows], FARTHEST)))
-        self._look(rows[stale], points[stale], FEW, reach)
-        moved[stale] = 0
         ranking = Ranking(self.target, points, normals, reach, agreement, bend)
-        self._compete(ranking, rows, np.arange(len(rows)), moved)
-        doubt = stale[self._seen[rows[stale]] - cover.usual < ranking.cost[stale]]
+        best = self._best[rows]
+        known = np.flatnonzero(best >= 0)
+        ranking.improve(known, best[known], np.zeros(len(known)))
+        left = np.flatnonzero(~settled(ranking))
+        moved = np.linalg.norm(points[left] - self._at[rows[left]], axis=1)
+        stale = ~(moved <= np.minimum(SLACK * self._seen[rows[left]], FARTHEST))
+        anew = left[stale]
+        self._look(rows[anew], points[anew], FEW, reach)
+        moved[stale] = 0
+        self._compete(ranking, rows, left, moved)
+        usual = BLIND * self.target.cover.usual
+        doubt = anew[~settled(ranking)[anew] & (self._seen[rows[anew]] - usual < ranking.cost[anew])]
         doubt = doubt[np.isfinite(self._seen[rows[doubt]])]
         if len(doubt):
             self._look(rows[doubt], points[doubt], MANY, reach)
-            self._compete(ranking, rows, doubt, moved)
+            self._compete(ranking, rows, doubt, np.zeros(len(doubt)))
+        self._best[rows] = ranking.triangle
         return ranking.contacts()
 
     def _look(self, rows, points, count, reach):
@@ -54,16 +63,19 @@ class Tracked:
         self._far[rows, far.shape[1] :] = np.inf
 
     def _compete(self, ranking, rows, some, moved):
-        """Let the triangles near the points ``some`` of ``rows`` compete, the one that was best before all others."""
-        near, bound = self._near[rows[some]], self._far[rows[some]] - moved[some, None]
-        best = self._best[rows[some]]
-        first = np.where(best >= 0, best, near[:, 0])
-        at = np.flatnonzero(first >= 0)
-        ranking.improve(some[at], first[at], np.zeros(len(at)))
+        """Let the triangles near the points ``some`` of ``rows`` compete, that of the nearest sample before all others."""
+        near, bound = self._near[rows[some]], self._far[rows[some]] - moved[:, None]
+        at = np.flatnonzero(near[:, 0] >= 0)
+        ranking.improve(some[at], near[at, 0], np.maximum(bound[at, 0] - self.target.cover.radius[near[at, 0]], 0))
         # What is infinitely far is none; of several samples of a triangle each may compete.
+        bound[settled(ranking)[some]] = np.inf
         row, column = np.nonzero(bound < (ranking.cost[some] + self.target.cover.most)[:, None])
         owner = near[row, column]
-        keep = np.flatnonzero(owner != first[row])
+        keep = np.flatnonzero(owner != near[row, 0])
         row, column, owner = row[keep], column[keep], owner[keep]
         ranking.improve(some[row], owner, bound[row, column] - self.target.cover.radius[owner])
-        self._best[rows[some]] = ranking.triangle[some]
+
+
+def settled(ranking: Ranking) -> np.ndarray:
+    """(k,) bool: the place found so far is the foot of the perpendicular on its triangle, and near."""
+    return (ranking.cost < SURE) & (ranking.weights > 0).all(axis=1)
