@@ -20,7 +20,7 @@ class Cover:
 
     def __init__(self, corners: np.ndarray, area: np.ndarray):
         usual = max(float(np.median(np.sqrt(2 * area))), 1e-6)
-        samples, self.owner, self.radius = spread(corners, usual * (0.55 if len(corners) < FEW else 0.75))
+        samples, self.owner, self.radius = spread(corners, usual * (0.55 if len(corners) < FEW else 1.3))
         self.most, self.usual = float(self.radius.max()), float(np.percentile(self.radius, USUAL))
         self._tree = cKDTree(samples, balanced_tree=False)
 
