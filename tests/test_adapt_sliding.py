@@ -172,13 +172,31 @@ def test_margins_of_lids_tell_how_unlike_the_eye_is(reference):
     assert unlike(rest, {k: v for k, v in rest.items() if k != "ps_l"}, "l") == 1
 
 
-@pytest.mark.parametrize("off, more", [(0.0, 0), (1.0, fine_fit.AGAIN)])
-def test_the_last_round_is_repeated_while_the_skin_is_off_the_data(reference, monkeypatch, off, more):
-    monkeypatch.setattr(fine_fit, "nearer", lambda base, moved, *rest: (moved, off))
+def rounds_of(reference):
+    """The generator of the last stage, for the reference on the surface drawn of it."""
     skin = reference.skin
     n = len(skin.vertices)
     free = ~(np.asarray(reference.groups["inner"]) > 0.5)
-    surface = scan_surface(reference, Mesh.from_triangles(skin.vertices, skin.triangles), {})
+    rows, quads = smoother(skin.faces, n, 2)
+    surface = scan_surface(reference, Mesh(rows @ skin.vertices, quads), {})
     none = fine_fit.Anchors(csr_matrix(([1.0], ([0], [0])), shape=(1, n)), np.zeros((1, 3)), np.ones(1))
-    work = fine_fit.fine_fit(skin.vertices, skin.faces, free, np.zeros(n, dtype=bool), surface, none)
-    assert len(list(work)) == len(fine_fit.SCHEDULE) + more
+    return fine_fit.fine_fit(skin.vertices, skin.faces, free, np.zeros(n, dtype=bool), surface, none)
+
+
+@pytest.mark.parametrize("off, more", [(0.0, -1), ((fine_fit.NEAR + fine_fit.LEFT) / 2, 0), (1.0, fine_fit.AGAIN)])
+def test_there_are_as_many_rounds_as_the_skin_is_off_the_data(reference, monkeypatch, off, more):
+    monkeypatch.setattr(fine_fit, "nearer", lambda base, moved, *rest: (moved, off))
+    assert len(list(rounds_of(reference))) == len(fine_fit.SCHEDULE) + more
+
+
+def test_a_skin_that_is_near_takes_the_last_round_at_once(reference, monkeypatch):
+    solve, taken = fine_fit.solve_displacement, []
+
+    def noted(smooth, soft, *rest):
+        taken.append(soft)
+        return solve(smooth, soft, *rest)
+
+    monkeypatch.setattr(fine_fit, "solve_displacement", noted)
+    list(rounds_of(reference))
+    softs = [soft for soft, _, _ in fine_fit.SCHEDULE]
+    assert taken == softs[:-2] + softs[-1:]

@@ -32,6 +32,7 @@ ALONG = 0.02  # weight of a pull along the surface against one across it
 AGREE = 0.6  # cosine between the normals of skin and scan
 WHOLE = 150.0  # mm²: a piece of data smaller than this is trusted in proportion
 FINE = 0.05  # stiffness below which data in between the cage's vertices is looked for too
+NEAR = 0.045  # mm off in the mean: a skin as near as that takes the last round at once
 LEFT = 0.06  # mm by which the last round may find the skin off, in the mean
 AGAIN = 2  # times at most that it is repeated if it is farther off
 LAST = 0.02  # stiffness below which rims look for data
@@ -105,9 +106,9 @@ def fine_fit(cage, faces, free, rim, target: Surface, anchors: Anchors, stiffnes
     anchors = replace(anchors, sampling=(anchors.sampling @ surface.rows[:n]).tocsr())
     soft = list(rounds[len(stiff) :])
     for turn, step in enumerate(soft + soft[-1:] * AGAIN):
-        moved, off = nearer(base, moved, surface, tracked, anchors, smooth, step)
+        moved, off = nearer(base, moved, surface, tracked, anchors, smooth, step, soft[-1][0])
         yield (len(stiff) + turn + 1) / turns
-        if turn + 1 >= len(soft) and off <= LEFT:
+        if off <= (LEFT if turn + 1 >= len(soft) else NEAR) and step[0] < LAST:
             break
     cage = base + moved
     now = surface.rows @ cage
@@ -122,11 +123,12 @@ def fine_fit(cage, faces, free, rim, target: Surface, anchors: Anchors, stiffnes
     return Fitted(cage, vertices, trust, gap)
 
 
-def nearer(base, moved, surface: DrawnPoints, tracked: Tracked, anchors: Anchors, smooth: Smoothness, step):
+def nearer(base, moved, surface: DrawnPoints, tracked: Tracked, anchors: Anchors, smooth: Smoothness, step, end=None):
     """One round, from the displacement ``moved`` (n, 3) of ``base`` (n, 3), of which ``surface`` is made, to the next.
 
-    step : of the schedule. Surroundings of folds are made stiffer in ``smooth``. Returns the displacement (n, 3) mm, and
-    how far off the data the skin was before, across it, in the mean, mm.
+    step : of the schedule; ``end`` : stiffness of its last round, taken at once where the skin is `NEAR` and rims look for
+    data. Surroundings of folds are made stiffer in ``smooth``. Returns the displacement (n, 3) mm, and how far off the data
+    the skin was before, across it, in the mean, mm.
     """
     soft, reach, width = step
     now = surface.rows @ (base + moved)
@@ -142,6 +144,9 @@ def nearer(base, moved, surface: DrawnPoints, tracked: Tracked, anchors: Anchors
     facing /= np.linalg.norm(facing, axis=1, keepdims=True)
     height = np.einsum("ij,ij->i", gap, facing)
     robust = trust[use] / (1 + (height / width) ** 2) ** 2
+    off = float(robust @ np.abs(height)) / max(float(robust.sum()), 1e-12)
+    if end is not None and soft < LAST and off <= NEAR:
+        soft = end
     rows, k = surface.rows[look[use]], len(anchors.weight)
     # A point is pulled along the normal, and a little along the surface; an anchor every way.
     facing, along = np.concatenate([facing, np.zeros((k, 3))]), np.append(np.full(len(use), ALONG), np.ones(k))
@@ -156,7 +161,7 @@ def nearer(base, moved, surface: DrawnPoints, tracked: Tracked, anchors: Anchors
         at = np.zeros(len(now))
         at[surface.triangles[worse].ravel()] = 1
         smooth.stiffen(surface.rows.T @ at > 0.2)
-    return moved, float(robust @ np.abs(height)) / max(float(robust.sum()), 1e-12)
+    return moved, off
 
 
 def folded(before, after, triangles, limit: float = 0.0):

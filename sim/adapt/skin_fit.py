@@ -177,7 +177,7 @@ def feature_triangles(reference: Head, names) -> np.ndarray:
 
 def facing_out(target: Surface, skin: np.ndarray, outer: np.ndarray) -> Surface:
     """``target``, turned if most of it faces the other way than the skin beside it (scans wound inside out)."""
-    used = np.unique(outer)
+    used = np.unique(outer)[::4]  # enough to tell
     facing = target.facing(skin[used], 20.0)
     agree = np.einsum("ij,ij->i", facing, vertex_normals(skin, outer)[used])[facing.any(axis=1)]
     return target.turned() if len(agree) and np.median(agree) < -0.2 else target
