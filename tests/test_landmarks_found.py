@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from headshop.sim.adapt.closest import Surface
+from headshop.sim.adapt.landmarks import read_landmarks
 from headshop.sim.adapt.shut_eyes import with_shut_eyes
 from headshop.sim.anatomy.landmark_names import SKIN, mirrored
 from headshop.sim.landmarks.expression import HOLED, holes_in_eyes
@@ -12,7 +13,9 @@ from headshop.sim.landmarks.find import find_landmarks
 from headshop.sim.mesh import Mesh
 from headshop.sim.mesh_subdivision import drawn
 from headshop.sim.progress import finish
+from headshop.sim.scan.clean import clean_scan
 from headshop.sim.scan.individual import draw_field
+from headshop.sim.scan.ply import read_ply
 
 EARS_AND_BACK = ("v", "op", "tr", "eu", "t", "sa", "sba", "pra", "pa", "obs", "obi")
 FACE = [n for n in SKIN if n.partition("_")[0] not in EARS_AND_BACK]
@@ -72,6 +75,16 @@ def test_what_a_damaged_scan_inside_out_does_not_show_is_in_mid_air_and_unsure(p
     seen = min(found.confidence[n] for n in ("prn", "en_l", "en_r", "sn"))
     assert all(found.confidence.get(n, 0.0) < 0.6 * seen for n in hidden)
     assert "op" not in found.sure() and "prn" in found.sure()
+
+
+@pytest.mark.parametrize("seed", [615, 1715])
+def test_a_small_head_cut_off_above_the_brows_is_found_in_any_turn(reference, shared, seed):
+    mesh, turn, shift = _turned(clean_scan(read_ply(shared / "ct_headsq" / "skin.ply"))[0], seed)
+    found = finish(find_landmarks(mesh, reference))
+    true = read_landmarks(shared / "ct_headsq" / "skin.landmarks.json")
+    off = {n: np.linalg.norm(found.positions[n] - (turn @ p + shift)) for n, p in true.items() if n in found.positions}
+    assert np.mean(list(off.values())) < 6.0
+    assert np.mean([off[n] for n in FACE if n in off]) < 4.8
 
 
 def test_open_eyes_have_holes_and_shut_ones_none(reference):

@@ -50,25 +50,26 @@ def even_rotations(count: int) -> np.ndarray:
     )
 
 
-def search_poses(points: np.ndarray, template: np.ndarray, count: int = 5) -> Work:
+def search_poses(points, template, count: int = 5, starts: int = STARTS, survivors: int = SURVIVORS) -> Work:
     """Work returning the ``count`` best placements of the face that differ by more than a little turn, best first.
 
     points (n, 3) mm : samples of the scan's surface, in any turn
     template (k, 3) mm : the reference's face, the tip of the nose first (`face_match.face_template`)
+    starts, survivors : turns to begin with, and how many placements go on after the first rounds
     """
     fine = cKDTree(thinned(points, FINE))
     coarse = thinned(points, COARSE)
     tree = cKDTree(coarse)
     few = template[in_order(template, FEW)]
-    turns = [*rotations(), *even_rotations(STARTS)]
+    turns = [*rotations(), *even_rotations(starts)]
     turn, shift, _ = starts_of(coarse, template, few, turns)
     yield Progress(0.2, LOOKING)
     scale, turn, shift, misfit = align(tree, few, turn, shift, rounds=4)
     yield Progress(0.6, LOOKING)
-    best = np.argsort(misfit, kind="stable")[:SURVIVORS]
+    best = np.argsort(misfit, kind="stable")[:survivors]
     scale, turn, shift, misfit = align(tree, few, turn[best], shift[best], 10, scale[best])
     yield Progress(0.8, LOOKING)
-    kept = _different(turn, misfit, 3 * count)
+    kept = _different(turn, misfit, max(3 * count, survivors // 4))
     scale, turn, shift, misfit = align(fine, template, turn[kept], shift[kept], 10, scale[kept])
     return [Pose(float(scale[k]), turn[k], shift[k], float(misfit[k])) for k in _different(turn, misfit, count)]
 

@@ -1,0 +1,192 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A face laid on a scan in any turn: placements are tried coarsely, the likeliest fitted in full, and the best judged."""
+
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from ..adapt.closest import Surface
+from ..adapt.relief import face_likeness
+from ..adapt.scan_surface import NORMALS
+from ..adapt.thin_plate_spline import similarity
+from ..anatomy.head import Head
+from ..errors import InputError
+from ..mesh import Mesh, vertex_normals
+from ..progress import Progress, Work, portion
+from ..scan.face_match import face_template, surface_samples
+from .pose_search import LOOKING, STARTS, SURVIVORS, Pose, search_poses
+from .shape_fit import TRIAL, NoFaceError, ShapeFit, fit_shape
+from .shape_space import ShapeSpace
+
+FITTING = "Fitting a face"
+NO_FACE = (
+    "No face is found in the scan: check that it shows one, or give landmarks with --landmarks or by clicking them."
+)
+TRIAL_MODES = 40
+
+
+@dataclass(frozen=True)
+class Look:
+    """One look for a face.
+
+    size : of the reference's, the face that is looked for to begin with
+    starts, survivors : see `search_poses`
+    tried : placements that are looked at closely
+    most, worse : how many of them are followed, and how much worse than the best these may fit at first
+    again : how many of those are begun again
+    relief : correlation with the relief of a face that is enough. Faces have 0.66 and more, most of them 0.8; balls, boxes
+        and backs of heads 0.4; the best of many places where none is, 0.6.
+    """
+
+    size: float
+    starts: int
+    survivors: int
+    tried: int
+    most: int
+    worse: float
+    again: int
+    relief: float
+
+
+#: The second is taken if the first shows no face: a thorough one, which begins with a small face, because a large one on a
+#: small head finds no hold.
+LOOKS = (Look(1.0, STARTS, SURVIVORS, 10, 3, 1.25, 1, 0.53), Look(0.8, 1000, 400, 14, 4, np.inf, 3, 0.7))
+CLEAR = 0.75  # relief from which on nothing better is looked for
+TURNS = 3  # times that a fit is begun again
+POOR = 2.6  # mm on a head of the reference's size: a mean distance in the face above which there is none
+
+
+def place_face(mesh: Mesh, reference: Head, space: ShapeSpace, unit_scales) -> Work:
+    """Work returning mm per unit of the mesh, one of ``unit_scales``, the `ShapeFit` and the `Surface` it lies on.
+
+    Raises
+    ------
+    InputError : there is no face in it.
+    """
+    few = space.reduced(TRIAL_MODES)
+    template, samples = face_template(reference), surface_samples(mesh)
+    results = []
+    for look, (low, middle, high) in zip(LOOKS, ((0.0, 0.5, 0.8), (0.8, 0.9, 1.0)), strict=True):
+        trials = []
+        for k, scale in enumerate(unit_scales):
+            part = (low + (middle - low) * (k + extra) / len(unit_scales) for extra in (0, 1))
+            trials += yield from portion(_trials(look, few, mesh, samples, template, scale), *part)
+        trials.sort(key=lambda t: t[0])
+        rivals = [t for t in trials if t[0] < look.worse * trials[0][0]][: look.most]
+        results += yield from portion(_fits(look, reference, space, few, rivals), middle, high)
+        if results:
+            verdict, scale, fit, target = min(results, key=lambda t: t[0])
+            if not verdict.doubtful:
+                return scale, fit, target
+    raise InputError(NO_FACE)
+
+
+def _trials(look, few, mesh, samples, template, scale) -> Work:
+    """Work returning placements of the face in a mesh of ``scale`` mm per unit: misfit, scale, `ShapeFit`, `Surface`."""
+    work = search_poses(samples * scale, look.size * template, look.tried, look.starts, look.survivors)
+    poses = yield from portion(work, 0.0, 0.5)
+    yield Progress(0.5, LOOKING)
+    target = Surface(mesh.vertices * scale, mesh.triangles, smooth=NORMALS).coarser()
+    trials = []
+    for k, pose in enumerate(poses):
+        pose = replace(pose, scale=pose.scale * look.size)
+        facing = _facing(few, target, pose)
+        part = (0.5 + 0.5 * (k + extra) / len(poses) for extra in (0, 1))
+        try:
+            fit = yield from run(fit_shape(few, facing, pose, TRIAL, every=3), *part, LOOKING)
+        except NoFaceError:
+            continue
+        trials.append((misfit_of(few, fit), scale, fit, facing))
+    return trials
+
+
+def _fits(look, reference, space, few, rivals) -> Work:
+    """Work returning the ``rivals`` (`_trials`) fitted in full: `_Verdict`, scale, `ShapeFit`, `Surface`.
+
+    While none is clearly a face, those most like one are begun again from where the whole of them lies now: a trial knows
+    turn and size of a face to ten degrees and a tenth; what those are off goes into the shape, and comes out of it
+    only bit by bit.
+    """
+    results = []
+    for k, (_, scale, fit, target) in enumerate(rivals):
+        work = fit_shape(space, target, fit.pose, coefficients=fit.coefficients)
+        try:
+            fit = yield from run(work, *(0.5 * (k + np.arange(2)) / len(rivals)), FITTING)
+        except NoFaceError:
+            continue
+        results.append((_judged(reference, space, fit, look.relief), scale, fit, target))
+    parts = iter(np.linspace(0.5, 1.0, look.again * TURNS + 1))
+    done = next(parts)
+    for verdict, scale, fit, target in sorted(results, key=lambda t: -t[0].likeness)[: look.again]:
+        for _ in range(TURNS):
+            if max(t[0].likeness for t in results) > CLEAR:
+                return results
+            done, before, start = next(parts), done, verdict
+            try:
+                work = fit_shape(few, target, _lies(space, fit), TRIAL, every=3)
+                fit = yield from run(work, before, (3 * before + done) / 4, FITTING)
+                work = fit_shape(space, target, fit.pose, coefficients=fit.coefficients)
+                fit = yield from run(work, (3 * before + done) / 4, done, FITTING)
+            except NoFaceError:
+                break
+            verdict = _judged(reference, space, fit, LOOKS[-1].relief)
+            results.append((verdict, scale, fit, target))
+            if not start.doubtful and verdict.likeness < start.likeness + 0.01:
+                break
+    return results
+
+
+def _lies(space, fit) -> Pose:
+    """How the whole of ``fit`` lies, its shape included."""
+    matrix, shift = similarity(space.points, fit.points)
+    size = float(np.cbrt(np.linalg.det(matrix)))
+    return Pose(size, matrix / size, shift, fit.pose.misfit)
+
+
+def _facing(space, target, pose):
+    """The scan turned inside out if its normals face away from those of a skin at ``pose``."""
+    points = pose.scale * space.points @ pose.turn.T + pose.shift
+    face = space.face > 0.5
+    found = target.closest(points[face], 15.0)
+    agree = np.einsum("ij,ij->i", found.normals, vertex_normals(points, space.triangles)[face])[found.found]
+    return target.turned() if len(agree) and np.median(agree) < 0 else target
+
+
+class _Verdict(NamedTuple):
+    """Whether a fit is doubtful as a face, how bad it is, and how much relief of a face the scan has under it."""
+
+    doubtful: bool
+    bad: float
+    likeness: float
+
+
+def _judged(reference, space, fit, relief) -> _Verdict:
+    """What to think of ``fit``, for which ``relief`` is enough."""
+    misfit, likeness = misfit_of(space, fit), _likeness(reference, space, fit)
+    return _Verdict(misfit > POOR or likeness < relief, misfit / max(likeness, 0.1), likeness)
+
+
+def _likeness(reference, space, fit):
+    """How much relief of a face the scan has where the skin was laid on it, see `adapt.likeness`."""
+    skin = reference.skin.vertices @ fit.matrix.T + fit.pose.shift
+    fitted = np.zeros(len(skin))
+    skin[space.vertices], fitted[space.vertices] = fit.points, fit.trust
+    return face_likeness(reference, skin, fitted)
+
+
+def misfit_of(space: ShapeSpace, fit: ShapeFit) -> float:
+    """Mean distance of the face to the scan, mm; what found nothing counts as far."""
+    weight = space.area * (space.face > 0.5)
+    distance = np.where(np.isfinite(fit.distance), np.abs(fit.distance), 6.0)
+    return float(np.average(distance, weights=weight)) / fit.pose.scale
+
+
+def run(work, start: float, stop: float, label: str) -> Work:
+    """Work returning what ``work``, which yields the fraction done, returns."""
+    while True:
+        try:
+            done = next(work)
+        except StopIteration as end:
+            return end.value
+        yield Progress(start + (stop - start) * done, label)
