@@ -11,7 +11,7 @@ import numpy as np
 from .closest import Contacts, Surface
 from .ranking import Ranking
 
-FEW, MANY = 8, 32  # nearest samples that are looked up for a point, and where those do not show a place beyond doubt
+FEW, MANY = 5, 32  # nearest samples that are looked up for a point, and where those do not show a place beyond doubt
 SLACK = 0.2  # share of the distance looked at by which a point may move before it is looked at anew
 FARTHEST = 1.0  # mm that it may move in any case
 SURE = 0.1  # mm: a perpendicular no longer than this shows the place. Farther off points would stick to old triangles
