@@ -10,14 +10,17 @@ from ..tissue.muscle_field import LIPS
 from ..tissue.structures import Model
 from .inputs import OTHERS
 from .jaw_frame import JawFrame
+from .kernel import LINEAR, SQUARE, matern, noise
 from .mirror import Seen, seen_twice
-from .rig import SQUARE, Region, Rig, coordinates, matern
+from .relevance import chosen, relevance
+from .rig import Region, Rig, coordinates
 from .sampling import Samples
 from .spending import fit_spending
 
 REGIONS = 20
-#: mm that a vertex must move in some sample to be in a region at all; mm rms that the modes may lose.
-_STILL, _LOST = 0.01, 0.03
+#: mm that a vertex must move in some sample to be in a region at all; mm rms that the modes may lose, at least and at most,
+#: and between these which share of what the region is off by anyway.
+_STILL, _LOST, _LOST_SHARE = 0.01, (0.01, 0.1), 0.15
 #: A region feels an input that moves it by this share of what its strongest one does.
 _FELT = 0.002
 #: Of that share, for its weight: between ignoring the weak and taking all alike. What changes how lips touch weighs more
@@ -25,9 +28,10 @@ _FELT = 0.002
 _POWER = 0.75
 _MORE = {"jaw_open": 2.0, "jaw_forward": 2.0, "jaw_side": 2.0, "seal": 2.5, "cheeks": 0.8}
 _MORE |= {"lip_upper_forward": 1.7, "lip_lower_forward": 1.7}
-#: Weight of the linear part beside the Matérn kernel. Noise of a sample: a share of its own variance, the less it moves the
-#: less it may be off, and a share of that of all.
-_LINEAR, _NOISE, _NOISE_OF_ALL = 3.0, 3e-5, 3e-7
+#: A region where samples tell each other as well as this, mm rms, looks at so many of them; if not quite so well, at all
+#: that were simulated; and at their mirror images besides where that is hard, as it is about the lips. With fewer samples
+#: than so many there is room for images everywhere.
+_EASY, _FEW, _HARD = 0.12, 700, 0.3
 
 
 def fit_rig(model: Model, samples: Samples, singles: int, opposite: np.ndarray | None = None) -> Work:
@@ -49,11 +53,15 @@ def fit_rig(model: Model, samples: Samples, singles: int, opposite: np.ndarray |
     members = [moving[region == r] for r in np.unique(region)]
     seen = seen_twice(model.muscle_names, samples.inputs, own, opposite)
     forces, bending = coordinates(spending, sphincters, seen.inputs)
-    scale, regions = [], []
+    some = chosen(len(own), singles)
+    found = []
     for number, vertices in enumerate(members):
         yield Progress(0.2 + 0.8 * number / len(members), f"Fitting region {number + 1} of {len(members)}")
-        scale.append(_scale(felt[:, vertices]))
-        regions.append(_fit_region(vertices, bending, forces, seen, scale[-1]))
+        motion = own[some][:, vertices].reshape(len(some), -1)
+        scale, off = relevance(bending[some], forces[some], motion, _scale(felt[:, vertices]), singles)
+        found.append((scale, _fit_region(vertices, bending, forces, seen, scale, off)))
+    found.sort(key=lambda each: -len(each[1].weights))
+    scale, regions = zip(*found, strict=True)
     packed = (np.array(x, np.float32) for x in (scale, bending, forces))
     return Rig(model.muscle_names, spending, frame, sphincters, *packed, tuple(regions))
 
@@ -85,28 +93,29 @@ def _scale(felt: np.ndarray) -> np.ndarray:
     return np.where(strength > _FELT, strength, 0.0) ** _POWER * more
 
 
-def _fit_region(vertices, bending, forces, seen: Seen, scale) -> Region:
-    """The regression of one region: what skin bends with, forces (s, p), and the motion of its vertices.
+def _fit_region(vertices, bending, forces, seen: Seen, scale, off: float) -> Region:
+    """The regression of one region: what skin bends with, forces (s, p), the motion of its vertices, and mm by which its
+    samples fail to tell each other.
 
     Mirror images are another face's poses: their covariance with the head's own is less by the correlation of both faces
     (intrinsic coregionalisation: Bonilla, Chai and Williams 2008).
     """
-    at, line = bending * scale, forces * scale
-    motion = seen.own[:, vertices].reshape(len(at), -1)
+    count = len(bending) if off > _HARD else max(seen.real.sum(), _FEW) if off > _EASY else _FEW
+    at, line, real = bending[:count] * scale, forces[:count] * scale, seen.real[:count]
+    motion = seen.own[:count, vertices].reshape(len(at), -1)
     values, axes = np.linalg.eigh(motion.T @ motion)  # least first
     lost = np.sqrt(3 * np.cumsum(values.clip(0)) / motion.size)
-    axes = axes[:, min(np.searchsorted(lost, _LOST), len(lost) - 1) :]
+    axes = axes[:, min(np.searchsorted(lost, np.clip(_LOST_SHARE * off, *_LOST)), len(lost) - 1) :]
     size = (at**2).sum(axis=1)
     kernel = matern(size[:, None] + size - 2 * at @ at.T)
     rest = matern(size)
     product = line @ line.T
-    kernel += _LINEAR * product + SQUARE * product**2 - rest[:, None] * rest
+    kernel += LINEAR * product + SQUARE * product**2 - rest[:, None] * rest
     alike = seen.alike(vertices)
-    kernel[np.ix_(seen.real, ~seen.real)] *= alike
-    kernel[np.ix_(~seen.real, seen.real)] *= alike
-    own = np.diag(kernel)
-    kernel[np.diag_indices_from(kernel)] += _NOISE * own + _NOISE_OF_ALL * own.mean()
+    kernel[np.ix_(real, ~real)] *= alike
+    kernel[np.ix_(~real, real)] *= alike
+    kernel[np.diag_indices_from(kernel)] += noise(kernel)
     weights = solve(kernel, motion @ axes, assume_a="pos")
-    weights[~seen.real] *= alike
-    linear = _LINEAR * scale[:, None] * (line.T @ weights)
-    return Region(vertices, *(x.astype(np.float32) for x in (weights, linear, np.ascontiguousarray(axes.T))))
+    weights[~real] *= alike
+    weights = np.concatenate([weights, LINEAR * scale[:, None] * (line.T @ weights)])
+    return Region(vertices, weights.astype(np.float32), np.ascontiguousarray(axes.T, np.float32))

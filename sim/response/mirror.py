@@ -15,9 +15,6 @@ from ..anatomy.head import Head
 from ..anatomy.storage import load_head
 from .inputs import input_names
 
-#: Samples and images at most: a pose of the rig takes as much longer as there are more.
-MOST = 1600
-
 
 @dataclass(frozen=True, eq=False)
 class Seen:
@@ -60,8 +57,7 @@ def mirrored_inputs(muscle_names, inputs: np.ndarray) -> np.ndarray:
 
 
 def seen_twice(muscle_names, inputs: np.ndarray, own: np.ndarray, opposite: np.ndarray | None) -> Seen:
-    """`Seen` of samples (s, p), (s, n, 3) and of their mirror images, where those are not simulated themselves, as far as
-    there is room for them.
+    """`Seen` of samples (s, p), (s, n, 3) and of their mirror images, where those are not simulated themselves.
 
     opposite : as `opposite_vertices` has it; None: no images
     """
@@ -72,7 +68,7 @@ def seen_twice(muscle_names, inputs: np.ndarray, own: np.ndarray, opposite: np.n
     place = {row.tobytes(): k for k, row in enumerate(_rounded(inputs))}
     found = np.array([place.get(row.tobytes(), -1) for row in _rounded(turned)])
     image = own[:, opposite] * np.array([-1, 1, 1], own.dtype)
-    new, known = np.flatnonzero(found < 0)[: max(MOST - len(own), 0)], np.flatnonzero(found >= 0)
+    new, known = np.flatnonzero(found < 0), np.flatnonzero(found >= 0)
     return Seen(
         np.concatenate([inputs, turned[new]]),
         np.concatenate([own, image[new]]),

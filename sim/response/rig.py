@@ -2,10 +2,9 @@
 """The response rig: the skin of a head in any pose in about a millisecond, learnt from the simulation.
 
 Inputs become forces and progress of the muscles (`spending`). The skin's own motion (`jaw_frame`) is linear in the
-forces plus a function of how it bends: kernel ridge regression with a Matérn 3/2 kernel (Rasmussen and Williams 2006,
-4.17 and 2.25; contact makes the response no smoother than that) and a little of a quadratic one in the forces, which tells
-of many muscles at once where samples are far between; region by region, each seeing only what moves it, in principal modes
-of what it does. At rest all terms vanish: the neutral face is exactly the scan.
+forces plus a function of how it bends: kernel ridge regression (Rasmussen and Williams 2006, 2.25; the kernel: `kernel`),
+region by region, each seeing only what moves it (`relevance`), in principal modes of what it does. At rest all terms
+vanish: the neutral face is exactly the scan.
 """
 
 from dataclasses import dataclass
@@ -13,42 +12,34 @@ from functools import cached_property
 
 import numpy as np
 
+from ..tissue.jaw import left_ahead, left_aside
 from ..tissue.structures import Control
-from .inputs import CENTRES, inputs_of
+from .inputs import CENTRES, OTHERS, inputs_of
 from .jaw_frame import JawFrame
+from .kernel import SQUARE, matern
 from .spending import Spending
 
-LENGTH = 2.5  # of the kernel, in the scaled coordinates of each region
 #: What skin bends with, of a muscle: its progress, and this share of its activation in place of as much of that.
 _ASKED = 0.4
-#: Of the quadratic kernel, beside the Matérn's 1.
-SQUARE = 0.03
-
-
-def matern(squared: np.ndarray) -> np.ndarray:
-    """Matérn 3/2 of squared distances (any shape), 1 at 0."""
-    far = np.sqrt(np.maximum(squared, 0.0) * squared.dtype.type(3 / LENGTH**2))
-    near = np.exp(-far)
-    near += far * near
-    return near
+_OPEN, _AHEAD, _ASIDE = (OTHERS.index(name) for name in ("jaw_open", "jaw_forward", "jaw_side"))
 
 
 @dataclass(frozen=True, eq=False)
 class Region:
     """Skin that is moved by the same: vertices (v,), and what its m modes are by kernel and force.
 
-    weights (s, m) over the samples' kernels; linear (p, m) over the forces; modes (m, 3 v) mm
+    weights (c + p, m) over the kernels of the first c samples and over the forces; modes (m, 3 v) mm
     """
 
     vertices: np.ndarray
     weights: np.ndarray
-    linear: np.ndarray
     modes: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
 class Rig:
-    """muscle_names of the head; sphincters: which of the k muscles that pull on skin are the lips' (-1: none); g regions.
+    """muscle_names of the head; sphincters: which of the k muscles that pull on skin are the lips' (-1: none); g regions,
+    those that look at most samples first.
 
     scale (g, p) weights of what skin bends with, 0 where a region does not feel an input; samples, pulls (s, p) what it bent
     with in the poses it was learnt from, and the forces in them
@@ -64,24 +55,21 @@ class Rig:
     regions: tuple[Region, ...]
 
     @cached_property
-    def _weight(self) -> np.ndarray:
-        """(g, p) of each squared difference in the squared distance of two poses, and of each product in their product."""
-        return np.ascontiguousarray(self.scale**2)
+    def _groups(self) -> tuple["_Group", ...]:
+        """The regions in groups that look at the same samples."""
+        counts = np.array([len(region.weights) for region in self.regions]) - self.samples.shape[1]
+        first = np.flatnonzero(np.diff(counts, prepend=-1))
+        out = []
+        for a, b in zip(first, [*first[1:], len(counts)], strict=True):
+            felt = np.flatnonzero(self.scale[a:b].any(axis=0))
+            seen = (np.ascontiguousarray(x[: counts[a], felt].T) for x in (self.samples, self.pulls))
+            out.append(_Group(felt, self.scale[a:b, felt] ** 2, *seen))
+        return tuple(out)
 
     @cached_property
-    def _samples(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """(p, s) what the samples bent with, and their forces; (g, 1, s) the squared distance of each from rest, and its kernel
-        with rest."""
-        across, pulls = np.ascontiguousarray(self.samples.T), np.ascontiguousarray(self.pulls.T)
-        far = (self._weight @ across**2)[:, None]
-        return across, pulls, far, matern(far)
-
-    @cached_property
-    def _together(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """All regions' linear parts side by side (p, total m), where each one's begins (g,), and their vertices (total v,)."""
-        linear = np.concatenate([region.linear for region in self.regions], axis=1)
-        first = np.cumsum([0, *(region.linear.shape[1] for region in self.regions)])
-        return linear, first, np.concatenate([region.vertices for region in self.regions])
+    def _vertices(self) -> np.ndarray:
+        """(total v,) the regions' vertices."""
+        return np.concatenate([region.vertices for region in self.regions])
 
     def skin(self, control: Control) -> np.ndarray:
         """(n, 3) mm, the skin in a pose."""
@@ -94,34 +82,62 @@ class Rig:
     def own(self, inputs: np.ndarray) -> np.ndarray:
         """(f, n, 3) mm: the skin's own motion for f rows of inputs (f, p)."""
         forces, bending = (x.astype(np.float32) for x in coordinates(self.spending, self.sphincters, inputs))
-        linear, first, vertices = self._together
-        modes = forces @ linear
-        moved = []
-        for region, kernel, at in zip(self.regions, self._kernels(forces, bending), first, strict=False):
-            amount = kernel @ region.weights
-            amount += modes[:, at : at + amount.shape[1]]
-            moved.append(amount @ region.modes)
+        likeness = (row for group in self._groups for row in group.kernels(forces, bending))
+        moved = [row @ region.weights @ region.modes for row, region in zip(likeness, self.regions, strict=True)]
         out = np.zeros((len(inputs), len(self.frame.rest), 3), np.float32)
-        out[:, vertices] = np.concatenate(moved, axis=1).reshape(len(inputs), -1, 3)
+        out[:, self._vertices] = np.concatenate(moved, axis=1).reshape(len(inputs), -1, 3)
         return out
 
-    def _kernels(self, forces: np.ndarray, bending: np.ndarray) -> np.ndarray:
-        """(g, f, s) kernel of every pose with every sample as each region sees them, less what either has with rest."""
-        across, pulls, far, rest = self._samples
-        size = (self._weight @ (bending**2).T)[..., None]
-        out = matern(far + size - 2 * np.stack([(self._weight * at) @ across for at in bending], axis=1))
-        out -= matern(size) * rest
-        product = np.stack([(self._weight * at) @ pulls for at in forces], axis=1)
+
+@dataclass(frozen=True, eq=False)
+class _Group:
+    """g regions that look at the same c samples: felt (q,) the inputs that any of them feels; weight (g, q) of each squared
+    difference in the squared distance of two poses, and of each product in their product; samples, pulls (q, c) as `Rig`
+    has them."""
+
+    felt: np.ndarray
+    weight: np.ndarray
+    samples: np.ndarray
+    pulls: np.ndarray
+
+    @cached_property
+    def _rest(self) -> tuple[np.ndarray, np.ndarray]:
+        """(g, 1, c) the squared distance of each sample from rest, and its kernel with rest."""
+        far = (self.weight @ self.samples**2)[:, None]
+        return far, matern(far)
+
+    def kernels(self, forces: np.ndarray, bending: np.ndarray) -> np.ndarray:
+        """(g, f, c + p) kernel of every pose with every sample as each region sees them, less what either has with rest;
+        then the forces (f, p)."""
+        far, rest = self._rest
+        count = self.samples.shape[1]
+        out = np.empty((len(self.weight), len(forces), count + forces.shape[1]), np.float32)
+        out[..., count:] = forces
+        forces, bending = forces[:, self.felt], bending[:, self.felt]
+        size = (self.weight @ (bending**2).T)[..., None]
+        squared = self._products(bending, self.samples)
+        squared *= -2
+        squared += far
+        squared += size
+        kernel = out[..., :count]
+        kernel[:] = matern(squared)
+        kernel -= matern(size) * rest
+        product = self._products(forces, self.pulls)
         product *= product
         product *= np.float32(SQUARE)
-        out += product
+        kernel += product
         return out
+
+    def _products(self, poses, samples):
+        """(g, f, c) of poses (f, q) with samples (q, c), by each region's weight; one product of matrices for all."""
+        both = (self.weight[:, None] * poses).reshape(-1, len(self.felt)) @ samples
+        return both.reshape(len(self.weight), len(poses), -1)
 
 
 def coordinates(spending: Spending, sphincters, inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """What the skin is linear in (f, p), forces, and what it bends with (f, p), between the progress of the muscles and what
-    is asked of them; each followed by the other inputs. Forces count 1 for a muscle alone at its end. A muscle that has
-    no entries in the tissue (of a lid) stays."""
+    is asked of them; each followed by the other inputs, of the jaw's motions what its opening leaves of them.
+    Forces count 1 for a muscle alone at its end. A muscle that has no entries in the tissue (of a lid) stays."""
     k = len(spending.mutual)
     activation, others = inputs[:, :k], inputs[:, k:].copy()
     forces, progress = spending.forces(activation, others)
@@ -130,6 +146,9 @@ def coordinates(spending: Spending, sphincters, inputs: np.ndarray) -> tuple[np.
             continue
         left = forces[:, muscle] / np.maximum(activation[:, muscle], 1e-6)
         others[:, at] *= np.where(activation[:, muscle] > 1e-6, left, 1.0)
+    opening = others[:, _OPEN]
+    others[:, _AHEAD] *= left_ahead(opening)
+    others[:, _ASIDE] *= left_aside(opening)
     own = np.diag(spending.mutual)
     without = ~spending.mutual.any(axis=1)
     progress = np.where(without, activation, progress)

@@ -15,7 +15,7 @@ from .mixtures import SIGNED, channels, composed_pose, crowded_pose, mixed_pose
 from .spending import progress_of
 
 #: Mixtures by how carefully a head is sampled.
-COUNTS = {"quick": 350, "normal": 1260, "fine": 1660}
+COUNTS = {"quick": 350, "normal": 1460, "fine": 1660}
 #: What mixtures are, by turns. All muscles at once fill a space of far more dimensions than what people do, so that they are
 #: the most: with none of them a pose of all muscles is off by twice as much as with these.
 _TURNS = (crowded_pose, mixed_pose, composed_pose, crowded_pose, composed_pose)

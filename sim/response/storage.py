@@ -12,7 +12,7 @@ from .jaw_frame import JawFrame
 from .rig import Region, Rig
 from .spending import Spending
 
-FORMAT = "headshop-response/4"
+FORMAT = "headshop-response/5"
 
 
 def to_bytes(rig: Rig, accuracy: dict | None = None) -> bytes:
@@ -21,7 +21,7 @@ def to_bytes(rig: Rig, accuracy: dict | None = None) -> bytes:
     arrays = {"about": np.array(json.dumps(about)), "mutual": rig.spending.mutual, "beside": rig.spending.beside}
     arrays |= {"scale": rig.scale, "samples": rig.samples, "pulls": rig.pulls, "jaw": rig.frame.share}
     for number, region in enumerate(rig.regions):
-        for field in ("vertices", "weights", "linear", "modes"):
+        for field in ("vertices", "weights", "modes"):
             arrays[f"region.{number}.{field}"] = getattr(region, field)
     stream = io.BytesIO()
     np.savez_compressed(stream, **arrays)
@@ -47,7 +47,7 @@ def from_bytes(data: bytes, head: Head) -> tuple[Rig, dict]:
         )
     regions = []
     while f"region.{len(regions)}.vertices" in arrays:
-        fields = ("vertices", "weights", "linear", "modes")
+        fields = ("vertices", "weights", "modes")
         regions.append(Region(*(arrays[f"region.{len(regions)}.{field}"] for field in fields)))
     if max((int(region.vertices.max(initial=0)) for region in regions), default=0) >= len(head.skin.vertices):
         raise InputError("The response stored with this head is of a head with other vertices: prepare it again.")

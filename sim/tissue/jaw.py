@@ -7,6 +7,9 @@ side the jaw turns about the condyle of that side, which stays but for a small s
 one slides forward, down and inward. The wider the mouth, the less is left of either (Posselt's envelope of motion).
 """
 
+from functools import lru_cache
+from math import atan2, cos, hypot, sin
+
 import numpy as np
 
 from ..anatomy.head import Jaw
@@ -23,34 +26,45 @@ _GUIDE = (1.0, 0.85, 2.5)
 
 
 def _rotation(axis: np.ndarray, angle: float) -> np.ndarray:
-    x, y, z = axis
-    k = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return np.eye(3) + np.sin(angle) * k + (1 - np.cos(angle)) * (k @ k)
+    x, y, z = axis.tolist()  # plain numbers: a pose of the response rig has no time for arrays of three
+    sine, cosine = sin(angle), cos(angle)
+    rest = 1 - cosine
+    return np.array(
+        [
+            [cosine + rest * x * x, rest * x * y - sine * z, rest * x * z + sine * y],
+            [rest * x * y + sine * z, cosine + rest * y * y, rest * y * z - sine * x],
+            [rest * x * z - sine * y, rest * y * z + sine * x, cosine + rest * z * z],
+        ]
+    )
 
 
 def _turn_onto(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """(3, 3) the smallest rotation that takes the direction of ``a`` (3,) to that of ``b`` (3,)."""
-    axis = np.cross(a, b)
-    size = np.linalg.norm(axis)
+    (ax, ay, az), (bx, by, bz) = a.tolist(), b.tolist()
+    axis = np.array([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])
+    size = hypot(*axis)
     if size < 1e-12:
         return np.eye(3)
-    return _rotation(axis / size, np.arctan2(size, a @ b))
+    return _rotation(axis / size, atan2(size, a @ b))
 
 
-def jaw_transform(jaw: Jaw, opening: float, forward: float = 0.0, side: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-    """Rotation (3, 3) and translation (3,) mm that carry the closed mandible to the position asked for.
+def left_ahead(opening):
+    """How much of the motion forward an open jaw still gives, 0..1 (Posselt's envelope)."""
+    return 1 - opening
 
-    opening 0..1 of ``open_max``; forward -1..1 of ``forward_max``, though backward only a little; side -1..1 of
-    ``side_max``, positive to the left. More than the joint gives is not given.
-    """
-    opening, forward, side = np.clip(opening, 0, 1), np.clip(forward, -1, 1), np.clip(side, -1, 1)
-    forward *= 1 - opening
-    side *= np.sqrt(1 - opening**2)
-    ahead_of, back_of, aside = max(forward, 0.0), max(-forward, 0.0), abs(side)
-    guide = np.dot(_GUIDE, [4 * ahead_of * (1 - ahead_of), back_of, aside * (2 - aside)]) * (1 - opening)
+
+def left_aside(opening):
+    """How much of the motion to the side an open jaw still gives, 0..1."""
+    return np.sqrt(1 - opening**2)
+
+
+@lru_cache(maxsize=8)
+def _directions(jaw: Jaw):
+    """Axis of the hinge, to the subject's left, mm between the condyles and their middle; from there to the incisors; up,
+    to the front, and along the condyles' path."""
     across = jaw.condyle_l - jaw.condyle_r
     width = np.linalg.norm(across)
-    axis = across / width  # to the subject's left
+    axis = across / width
     pivot = (jaw.condyle_l + jaw.condyle_r) / 2
     ahead = jaw.incisor - pivot
     ahead = ahead - (ahead @ axis) * axis
@@ -61,7 +75,24 @@ def jaw_transform(jaw: Jaw, opening: float, forward: float = 0.0, side: float = 
     front = ahead - (ahead @ up) * up
     front /= np.linalg.norm(front)
     path = np.cos(_PATH_SLOPE) * front - np.sin(_PATH_SLOPE) * up
-    rotation = _rotation(axis, float(opening * jaw.open_max + guide / np.linalg.norm(ahead)))
+    return axis, width, pivot, ahead, up, front, path
+
+
+def jaw_transform(jaw: Jaw, opening: float, forward: float = 0.0, side: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    """Rotation (3, 3) and translation (3,) mm that carry the closed mandible to the position asked for.
+
+    opening 0..1 of ``open_max``; forward -1..1 of ``forward_max``, though backward only a little; side -1..1 of
+    ``side_max``, positive to the left. More than the joint gives is not given.
+    """
+    opening, forward, side = (
+        min(max(float(x), low), 1.0) for x, low in ((opening, 0.0), (forward, -1.0), (side, -1.0))
+    )
+    forward, side = forward * left_ahead(opening), side * left_aside(opening)
+    ahead_of, back_of, aside = max(forward, 0.0), max(-forward, 0.0), abs(side)
+    ways = (4 * ahead_of * (1 - ahead_of), back_of, aside * (2 - aside))
+    guide = (1 - opening) * sum(a * b for a, b in zip(_GUIDE, ways, strict=True))
+    axis, width, pivot, ahead, up, front, path = _directions(jaw)
+    rotation = _rotation(axis, opening * jaw.open_max + guide / hypot(*ahead))
     if (rotation @ ahead - ahead) @ up > 0:  # opening lowers the incisors, whichever way the axis points
         rotation = rotation.T
     shift = (jaw.slide_max * opening**1.7 + jaw.forward_max * ahead_of) * path

@@ -1,0 +1,34 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How alike two poses are: Matérn 3/2 in what skin bends with, linear and a little quadratic in the forces.
+
+Rasmussen and Williams 2006, 4.17 and 4.2.2. Contact makes the response no smoother than the first; the last tells of many
+muscles at once, where samples are far between.
+"""
+
+import numpy as np
+
+#: Of the Matérn kernel, in the scaled coordinates of a region.
+LENGTH = 2.5
+#: Weights of the linear and of the quadratic kernel, beside the Matérn's 1.
+LINEAR, SQUARE = 3.0, 0.03
+#: Noise of a sample: a share of its own variance, the less it moves the less it may be off, and a share of that of all.
+_NOISE, _NOISE_OF_ALL = 3e-5, 3e-7
+
+
+def matern(squared: np.ndarray) -> np.ndarray:
+    """Matérn 3/2 of squared distances (any shape), 1 at 0."""
+    far = np.sqrt(np.maximum(squared, 0.0) * squared.dtype.type(3 / LENGTH**2))
+    near = np.exp(-far)
+    near += far * near
+    return near
+
+
+def matern_slope(squared: np.ndarray) -> np.ndarray:
+    """Its slope by the squared distances."""
+    return np.exp(-np.sqrt(np.maximum(squared, 0.0) * (3 / LENGTH**2))) * (-1.5 / LENGTH**2)
+
+
+def noise(kernel: np.ndarray) -> np.ndarray:
+    """(s,) the noise of samples whose kernel (s, s) is this."""
+    own = np.diag(kernel)
+    return _NOISE * own + _NOISE_OF_ALL * own.mean()
