@@ -118,4 +118,5 @@ def _fit_region(vertices, bending, forces, seen: Seen, scale, off: float) -> Reg
     weights = solve(kernel, motion @ axes, assume_a="pos")
     weights[~real] *= alike
     weights = np.concatenate([weights, LINEAR * scale[:, None] * (line.T @ weights)])
-    return Region(vertices, weights.astype(np.float32), np.ascontiguousarray(axes.T, np.float32))
+    # Column by column: a single pose multiplies these with a vector, and so they are read in one go.
+    return Region(vertices, np.asfortranarray(weights, np.float32), np.ascontiguousarray(axes.T, np.float32))
