@@ -32,11 +32,20 @@ def input_names(muscle_names) -> tuple[str, ...]:
     return (*pulling(muscle_names), *OTHERS)
 
 
+@cache
+def _places(muscle_names: tuple[str, ...]) -> tuple[np.ndarray, tuple[int | None, ...]]:
+    """Where in a head's muscles those are that act on skin, and the lips' sphincters (None: it has none)."""
+    place = {name: k for k, name in enumerate(muscle_names)}
+    return np.array([place[name] for name in pulling(muscle_names)], int), tuple(place.get(name) for name in LIPS)
+
+
 def inputs_of(muscle_names, control: Control) -> np.ndarray:
     """(p,) the inputs of `input_names`: 0 at rest, about 1 (or -1) at their limits."""
-    activation = dict(zip(muscle_names, np.asarray(control.activations, float), strict=True))
-    muscles = [activation[name] for name in pulling(muscle_names)]
-    centres = [control.lips[k] * activation.get(name, 0.0) for k, name in enumerate(LIPS)]
+    skin, lips = _places(muscle_names)
+    activations = np.asarray(control.activations, float)
+    centres = [0.0 if k is None else at * activations[k] for at, k in zip(control.lips, lips, strict=True)]
     gaze = [control.gaze_of(side) / GAZE_REACH for side in "lr"]
     jaw = np.clip(control.jaw, (0, -1, -1), 1)
-    return np.concatenate([muscles, jaw, np.ravel(control.lids), *gaze, centres, [control.seal, control.cheeks]])
+    return np.concatenate(
+        [activations[skin], jaw, np.ravel(control.lids), *gaze, centres, [control.seal, control.cheeks]]
+    )

@@ -17,9 +17,12 @@ _NOISE, _NOISE_OF_ALL = 3e-5, 3e-7
 
 def matern(squared: np.ndarray) -> np.ndarray:
     """Matérn 3/2 of squared distances (any shape), 1 at 0."""
-    far = np.sqrt(np.maximum(squared, 0.0) * squared.dtype.type(3 / LENGTH**2))
+    far = np.maximum(squared, 0.0)
+    far *= squared.dtype.type(3 / LENGTH**2)
+    np.sqrt(far, out=far)
     near = np.exp(-far)
-    near += far * near
+    far += 1
+    near *= far
     return near
 
 

@@ -115,16 +115,14 @@ class _Group:
         out[..., count:] = forces
         forces, bending = forces[:, self.felt], bending[:, self.felt]
         size = (self.weight @ (bending**2).T)[..., None]
-        squared = self._products(bending, self.samples)
-        squared *= -2
+        squared = self._products(-2 * bending, self.samples)
         squared += far
         squared += size
         kernel = out[..., :count]
         kernel[:] = matern(squared)
         kernel -= matern(size) * rest
-        product = self._products(forces, self.pulls)
+        product = self._products(np.float32(SQUARE**0.5) * forces, self.pulls)
         product *= product
-        product *= np.float32(SQUARE)
         kernel += product
         return out
 
