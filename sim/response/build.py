@@ -23,12 +23,12 @@ def build_rig(head: Head, care: str = "normal", seed: int = 0, unseen: int = 2) 
     model = build_model(head)
     names = model.muscle_names
     poses = drawn_poses(names, COUNTS[care], np.random.default_rng(seed))
-    border = 0.9 if unseen else 0.98
+    border = 0.75 if unseen else 0.83
     samples = yield from portion(sampled(model, poses), 0.01, border)
     rig: Rig = yield from portion(
-        fit_rig(model, samples, len(single_poses(names)), opposite_vertices(head)), border, border + 0.02
+        fit_rig(model, samples, len(single_poses(names)), opposite_vertices(head)), border, border + 0.17
     )
     report = {}
     if unseen:
-        report = yield from portion(measured(rig, model, (*KINDS, "expressions"), unseen), border + 0.02, 1.0)
+        report = yield from portion(measured(rig, model, (*KINDS, "expressions"), unseen), border + 0.17, 1.0)
     return rig, report

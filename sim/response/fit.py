@@ -10,7 +10,7 @@ from ..tissue.muscle_field import LIPS
 from ..tissue.structures import Model
 from .inputs import OTHERS
 from .jaw_frame import JawFrame
-from .kernel import LINEAR, SQUARE, matern, noise
+from .kernel import LINEAR, likeness, noise
 from .mirror import Seen, seen_twice
 from .relevance import chosen, relevance
 from .rig import Region, Rig, coordinates
@@ -101,22 +101,18 @@ def _fit_region(vertices, bending, forces, seen: Seen, scale, off: float) -> Reg
     (intrinsic coregionalisation: Bonilla, Chai and Williams 2008).
     """
     count = len(bending) if off > _HARD else max(seen.real.sum(), _FEW) if off > _EASY else _FEW
-    at, line, real = bending[:count] * scale, forces[:count] * scale, seen.real[:count]
-    motion = seen.own[:count, vertices].reshape(len(at), -1)
+    bending, forces, real = bending[:count], forces[:count], seen.real[:count]
+    motion = seen.own[:count, vertices].reshape(len(bending), -1)
     values, axes = np.linalg.eigh(motion.T @ motion)  # least first
     lost = np.sqrt(3 * np.cumsum(values.clip(0)) / motion.size)
     axes = axes[:, min(np.searchsorted(lost, np.clip(_LOST_SHARE * off, *_LOST)), len(lost) - 1) :]
-    size = (at**2).sum(axis=1)
-    kernel = matern(size[:, None] + size - 2 * at @ at.T)
-    rest = matern(size)
-    product = line @ line.T
-    kernel += LINEAR * product + SQUARE * product**2 - rest[:, None] * rest
+    kernel, *_ = likeness(bending, forces, scale**2)
     alike = seen.alike(vertices)
     kernel[np.ix_(real, ~real)] *= alike
     kernel[np.ix_(~real, real)] *= alike
     kernel[np.diag_indices_from(kernel)] += noise(kernel)
     weights = solve(kernel, motion @ axes, assume_a="pos")
     weights[~real] *= alike
-    weights = np.concatenate([weights, LINEAR * scale[:, None] * (line.T @ weights)])
+    weights = np.concatenate([weights, LINEAR * scale[:, None] ** 2 * (forces.T @ weights)])
     # Column by column: a single pose multiplies these with a vector, and so they are read in one go.
     return Region(vertices, np.asfortranarray(weights, np.float32), np.ascontiguousarray(axes.T, np.float32))

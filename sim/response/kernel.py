@@ -35,3 +35,15 @@ def noise(kernel: np.ndarray) -> np.ndarray:
     """(s,) the noise of samples whose kernel (s, s) is this."""
     own = np.diag(kernel)
     return _NOISE * own + _NOISE_OF_ALL * own.mean()
+
+
+def likeness(bending: np.ndarray, forces: np.ndarray, relevances: np.ndarray):
+    """Kernel (s, s) of samples that bent with (s, p) and pulled with (s, p), less what they have with rest, each input
+    counting by its ``relevances`` (p,); and what it is made of: squared distances (s, s), of each from rest (s,), products
+    of the forces (s, s)."""
+    bend = bending * relevances
+    size = (bend * bending).sum(axis=1)
+    far = size[:, None] + size - 2 * bend @ bending.T
+    product, rest = (forces * relevances) @ forces.T, matern(size)
+    kernel = matern(far) - rest[:, None] * rest + LINEAR * product + SQUARE * product**2
+    return kernel, far, size, product

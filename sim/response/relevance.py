@@ -9,7 +9,7 @@ Keerthi 2001). In millimetres, not in likelihood: it is millimetres that are see
 import numpy as np
 from scipy.optimize import minimize
 
-from .kernel import LINEAR, SQUARE, matern, matern_slope, noise
+from .kernel import LINEAR, SQUARE, likeness, matern, matern_slope, noise
 
 #: Samples that are looked at, steps, and modes of the motion: more told hardly better.
 COUNT, _STEPS, _MODES = 600, 40, 20
@@ -58,11 +58,7 @@ def relevance(bending: np.ndarray, forces: np.ndarray, motion: np.ndarray, scale
 
 def _left_out(relevances, bending, forces, modes, weight):
     """Mean squared error of each sample told from all others, over the modes, and its slope by the ``relevances`` (p,)."""
-    line, bend = forces * relevances, bending * relevances
-    size = (bend * bending).sum(axis=1)
-    far = size[:, None] + size - 2 * bend @ bending.T
-    product, rest = line @ forces.T, matern(size)
-    kernel = matern(far) - rest[:, None] * rest + LINEAR * product + SQUARE * product**2
+    kernel, far, size, product = likeness(bending, forces, relevances)
     kernel[np.diag_indices_from(kernel)] += noise(kernel)
     inverse = np.linalg.inv(kernel)
     apart = np.diag(inverse)
@@ -76,6 +72,6 @@ def _left_out(relevances, bending, forces, modes, weight):
     by_kernel = (by_kernel + by_kernel.T) / (2 * total)
     by_far = by_kernel * matern_slope(far)
     slope = 2 * (by_far.sum(axis=1) @ bending**2 - np.einsum("ip,ip->p", bending, by_far @ bending))
-    slope -= 2 * ((by_kernel @ rest) * matern_slope(size)) @ bending**2
+    slope -= 2 * ((by_kernel @ matern(size)) * matern_slope(size)) @ bending**2
     slope += np.einsum("ip,ip->p", forces, (by_kernel * (LINEAR + 2 * SQUARE * product)) @ forces)
     return (weight @ squared) / total, slope
