@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Which libraries this Blender has, and what to tell the artist about one it has not.
 
-The zips for Blender's own builds bundle scipy and xatlas; the zip without wheels relies on the system's Python.
+The zips for Blender's own builds bundle scipy, threadpoolctl and xatlas; the zip without wheels relies on the system's Python.
 """
 
 from functools import cache
@@ -10,6 +10,7 @@ from importlib import metadata, util
 #: Library -> what it is for.
 NEEDED_FOR = {
     "scipy": "fitting and simulating heads",
+    "threadpoolctl": "fast fits while other work runs",
     "xatlas": "repacking UVs",
 }
 

@@ -23,7 +23,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 LOCK = Path(__file__).resolve().with_name("wheels.lock")
 WHEELS = ROOT / "wheels"
-REQUIREMENTS = ("scipy==1.15.3", "xatlas==0.0.11")
+REQUIREMENTS = ("scipy==1.15.3", "threadpoolctl==3.8.0", "xatlas==0.0.11")
 PYTHONS = ("3.11", "3.13")
 #: Blender's name of a platform -> wheel platform tags its oldest supported systems accept.
 PLATFORMS = {

@@ -22,7 +22,7 @@ class Cover:
         usual = max(float(np.median(np.sqrt(2 * area))), 1e-6)
         samples, self.owner, self.radius = spread(corners, usual * (0.55 if len(corners) < FEW else 1.3))
         self.most, self.usual = float(self.radius.max()), float(np.percentile(self.radius, USUAL))
-        self._tree = cKDTree(samples, balanced_tree=False)
+        self._tree = cKDTree(samples, leafsize=32, compact_nodes=False, balanced_tree=False)  # what is soonest made
 
     def nearest(self, points, count, reach):
         """Distance (k, c) mm and index (k, c) of the ``count`` samples nearest to points (k, 3).

@@ -11,9 +11,11 @@ def weld(vertices: np.ndarray, triangles: np.ndarray, tolerance: float = 1e-5):
 
     Returns vertices (n, 3), triangles (m, 3).
     """
-    span = max(float(np.ptp(vertices, axis=0).max()), 1e-9) if len(vertices) else 1.0
-    grid = np.round((vertices - vertices.min(axis=0)) / (tolerance * span)).astype(np.int64)
-    key = (grid[:, 0] << 42) ^ (grid[:, 1] << 21) ^ grid[:, 2]
+    planes = vertices.T.copy()
+    low = planes.min(axis=1, keepdims=True, initial=np.inf)
+    span = max(float((planes - low).max(initial=0)), 1e-9)
+    grid = np.round((planes - low) / (tolerance * span)).astype(np.int64)
+    key = (grid[0] << 42) ^ (grid[1] << 21) ^ grid[2]
     _, first, back = np.unique(key, return_index=True, return_inverse=True)
     merged = back.reshape(-1)[triangles]
     vertices = vertices[first]

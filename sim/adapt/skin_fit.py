@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The skin of the reference fitted to a scan: warp, refine, reach the data (Kähler et al. 2002, section 6)."""
 
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,6 +9,7 @@ from scipy.sparse import csr_matrix, vstack
 
 from ..anatomy.head import Head, SurfacePoints
 from ..anatomy.landmark_names import SKIN
+from ..blas import on_one_thread
 from ..mesh import vertex_normals
 from ..mesh_subdivision import drawn, undrawn
 from ..progress import Progress, Work
@@ -70,7 +72,13 @@ def fit_skin(reference: Head, target: Surface, given: dict[str, np.ndarray]) -> 
 
     It is the surface drawn of the skin, the limit of its subdivision, that is laid on the scan.
     """
+    return on_one_thread(_fitting(reference, target, given))
+
+
+def _fitting(reference: Head, target: Surface, given: dict[str, np.ndarray]) -> Work:
     yield Progress(0.0, "Looking at lids and lips")
+    data = target.coarser()
+    ready = prepared(data)
     lips_closed, closed = as_scanned(reference, given)
     whole, given, lips = with_lips_as_scanned(lips_closed, target, given)
     reference = whole.with_vertices({"skin": drawn(whole.skin.faces, whole.skin.vertices)})
@@ -99,8 +107,11 @@ def fit_skin(reference: Head, target: Surface, given: dict[str, np.ndarray]) -> 
     aim = np.concatenate([goal, margin_goal])
     first = ThinPlateSpline.fit(np.concatenate([marks, skin.vertices[margin]]), aim, give)
     moved = first.transform(skin.vertices)
-    target = facing_out(target, moved, outer)
-    data = target.coarser()
+    ready.result()
+    if faces_in(data, moved, outer):
+        same = data is target
+        target = target.turned()
+        data = target if same else data.turned()
     # Landmarks that were not given are where the skin is now; data will move them.
     now = np.concatenate([rows @ moved, moved[margin]])
     aim[: len(names)] = np.where(known[:, None], goal, now[: len(names)])
@@ -175,12 +186,20 @@ def feature_triangles(reference: Head, names) -> np.ndarray:
     return order[reference.feature_mesh]
 
 
-def facing_out(target: Surface, skin: np.ndarray, outer: np.ndarray) -> Surface:
-    """``target``, turned if most of it faces the other way than the skin beside it (scans wound inside out)."""
+def prepared(data: Surface) -> Future:
+    """The future in which ``data`` can be searched: what that needs is made in a thread of its own."""
+    beside = ThreadPoolExecutor(1)
+    ready = beside.submit(lambda: (data.cover, data.normals, data.piece_area))
+    beside.shutdown(wait=False)
+    return ready
+
+
+def faces_in(data: Surface, skin: np.ndarray, outer: np.ndarray) -> bool:
+    """Whether most of ``data`` faces the other way than the skin beside it (scans wound inside out)."""
     used = np.unique(outer)[::4]  # enough to tell
-    facing = target.facing(skin[used], 20.0)
+    facing = data.facing(skin[used], 20.0)
     agree = np.einsum("ij,ij->i", facing, vertex_normals(skin, outer)[used])[facing.any(axis=1)]
-    return target.turned() if len(agree) and np.median(agree) < -0.2 else target
+    return len(agree) > 0 and np.median(agree) < -0.2
 
 
 def refinable(reference: Head, outer: np.ndarray, rim: np.ndarray) -> np.ndarray:

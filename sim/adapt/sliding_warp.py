@@ -12,7 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
-from scipy.spatial.distance import cdist
 
 from .completion import AMPLITUDE
 from .thin_plate_spline import blocks
@@ -21,13 +20,21 @@ TOGETHER = 40.0  # mm over which neighbouring features stray together
 ALIKE = 0.8  # how much of that a place shares with its mirror image
 
 
-def covariance(apart):
-    """Of displacements of points ``apart`` mm, mm²: Matérn's with one derivative, which has no cusp at a landmark."""
-    x = np.sqrt(3) / TOGETHER * apart
+def covariance(points, others):
+    """(k, m) mm², single precision: of displacements at points (k, 3) and ``others`` (m, 3) mm. Matérn's with one
+    derivative, which has no cusp at a landmark."""
+    middle = others.mean(axis=0)
+    a, b = ((np.sqrt(3) / TOGETHER * (at - middle)).astype(np.float32) for at in (points, others))
+    # Their distances squared as one product: |a|² - 2 a b + |b|².
+    left, right = np.ones((len(a), 5), np.float32), np.ones((5, len(b)), np.float32)
+    left[:, :3], left[:, 3] = -2 * a, (a * a).sum(axis=1)
+    right[:3], right[4] = b.T, (b * b).sum(axis=1)
+    x = left @ right
+    np.sqrt(np.maximum(x, 0, out=x), out=x)
     out = np.exp(-x)
     x += 1
     out *= x
-    out *= AMPLITUDE**2
+    out *= np.float32(AMPLITUDE**2)
     return out
 
 
@@ -78,14 +85,18 @@ class SlidingWarp:
         way = np.concatenate([frames.reshape(-1, 3), normals])
         of = np.concatenate([np.repeat(np.arange(k), 3), k + np.arange(m)])
         seen = np.einsum("ij,ij->i", np.concatenate([goals - marks, places - sites])[of], way)
-        table = covariance(cdist(at, at))[np.ix_(of, of)]
-        table *= way @ way.T
+
+        def observed(others, ways):
+            """(o, o) covariance of what is observed with the same at ``others`` along ``ways``."""
+            return covariance(at, others).take(of, axis=0).take(of, axis=1) * (way @ ways.T)
+
+        table = observed(at, way)
         if mirror:
-            table += ALIKE * covariance(cdist(at, mirror.places(at)))[np.ix_(of, of)] * (way @ mirror.ways(way).T)
+            table += ALIKE * observed(mirror.places(at), mirror.ways(way))
         table[np.diag_indices_from(table)] += np.concatenate([noise.ravel(), slack]) ** 2
         terms = np.column_stack([np.ones(k + m), (at - middle) / size])
         trend = (way[:, :, None] * terms[of][:, None]).reshape(len(of), 12)
-        factor = cho_factor(table, overwrite_a=True, check_finite=False)
+        factor = cho_factor(table.T, overwrite_a=True, check_finite=False)  # symmetric: as BLAS likes it, no copy
         rest = cho_solve(factor, np.column_stack([trend, seen]), check_finite=False)
         linear = np.linalg.solve(trend.T @ rest[:, :12], trend.T @ rest[:, 12])
         strength = rest[:, 12] - rest[:, :12] @ linear
@@ -102,6 +113,7 @@ class SlidingWarp:
         """Warped points (k, 3), computed in blocks so that memory stays small."""
         points = np.asarray(points, dtype=float)
         out = points + points @ self.matrix.T + self.shift
-        for part in blocks(len(points), len(self.centres)):
-            out[part] += covariance(cdist(points[part], self.centres)) @ self.weights
+        weights = self.weights.astype(np.float32)
+        for part in blocks(len(points), len(self.centres) // 2):  # single precision
+            out[part] += covariance(points[part], self.centres) @ weights
         return out
