@@ -12,6 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
+from ..blas import one_thread
 from ..tissue.jaw import left_ahead, left_aside
 from ..tissue.structures import Control
 from .inputs import CENTRES, OTHERS, inputs_of
@@ -82,8 +83,9 @@ class Rig:
     def own(self, inputs: np.ndarray) -> np.ndarray:
         """(f, n, 3) mm: the skin's own motion for f rows of inputs (f, p)."""
         forces, bending = (x.astype(np.float32) for x in coordinates(self.spending, self.sphincters, inputs))
-        likeness = (row for group in self._groups for row in group.kernels(forces, bending))
-        moved = [row @ region.weights @ region.modes for row, region in zip(likeness, self.regions, strict=True)]
+        with one_thread():
+            likeness = (row for group in self._groups for row in group.kernels(forces, bending))
+            moved = [row @ region.weights @ region.modes for row, region in zip(likeness, self.regions, strict=True)]
         out = np.zeros((len(inputs), len(self.frame.rest), 3), np.float32)
         out[:, self._vertices] = np.concatenate(moved, axis=1).reshape(len(inputs), -1, 3)
         return out
