@@ -77,14 +77,14 @@ def test_what_a_damaged_scan_inside_out_does_not_show_is_in_mid_air_and_unsure(p
     assert "op" not in found.sure() and "prn" in found.sure()
 
 
-@pytest.mark.parametrize("seed", [615, 1715])
+@pytest.mark.parametrize("seed", [1115, 1815])
 def test_a_small_head_cut_off_above_the_brows_is_found_in_any_turn(reference, shared, seed):
     mesh, turn, shift = _turned(clean_scan(read_ply(shared / "ct_headsq" / "skin.ply"))[0], seed)
     found = finish(find_landmarks(mesh, reference))
     true = read_landmarks(shared / "ct_headsq" / "skin.landmarks.json")
     off = {n: np.linalg.norm(found.positions[n] - (turn @ p + shift)) for n, p in true.items() if n in found.positions}
     assert np.mean(list(off.values())) < 6.0
-    assert np.mean([off[n] for n in FACE if n in off]) < 4.8
+    assert np.mean([off[n] for n in FACE if n in off]) < 4.0
 
 
 def test_open_eyes_have_holes_and_shut_ones_none(reference):

@@ -34,7 +34,8 @@ class Look:
     starts, survivors : see `search_poses`
     tried : placements that are looked at closely
     most, worse : how many of them are followed, and how much worse than the best these may fit at first
-    again : how many of those are begun again
+    further : how many are, whatever they fit like, while none shows a face
+    again : how many of those are begun again, the first of them and, while none shows a face, others
     relief : correlation with the relief of a face that is enough. Faces have 0.66 and more, most of them 0.8; balls, boxes
         and backs of heads 0.4; the best of many places where none is, 0.6.
     """
@@ -45,13 +46,14 @@ class Look:
     tried: int
     most: int
     worse: float
+    further: int
     again: int
     relief: float
 
 
 #: The second is taken if the first shows no face: a thorough one, which begins with a small face, because a large one on a
 #: small head finds no hold.
-LOOKS = (Look(1.0, STARTS, SURVIVORS, 10, 3, 1.25, 1, 0.53), Look(0.8, 1000, 400, 14, 4, np.inf, 3, 0.7))
+LOOKS = (Look(1.0, STARTS, SURVIVORS, 10, 3, 1.25, 5, 2, 0.53), Look(0.8, 1000, 400, 14, 4, np.inf, 4, 4, 0.7))
 CLEAR = 0.75  # relief from which on nothing better is looked for
 TURNS = 3  # times that a fit is begun again
 POOR = 2.6  # mm on a head of the reference's size: a mean distance in the face above which there is none
@@ -73,8 +75,9 @@ def place_face(mesh: Mesh, reference: Head, space: ShapeSpace, unit_scales) -> W
             part = (low + (middle - low) * (k + extra) / len(unit_scales) for extra in (0, 1))
             trials += yield from portion(_trials(look, few, mesh, samples, template, scale), *part)
         trials.sort(key=lambda t: t[0])
-        rivals = [t for t in trials if t[0] < look.worse * trials[0][0]][: look.most]
-        results += yield from portion(_fits(look, reference, space, few, rivals), middle, high)
+        good = sum(t[0] < look.worse * trials[0][0] for t in trials[: look.most])
+        rivals = trials[: look.further]
+        results += yield from portion(_fits(look, reference, space, few, rivals, good), middle, high)
         if results:
             verdict, scale, fit, target = min(results, key=lambda t: t[0])
             if not verdict.doubtful:
@@ -101,24 +104,32 @@ def _trials(look, few, mesh, samples, template, scale) -> Work:
     return trials
 
 
-def _fits(look, reference, space, few, rivals) -> Work:
+def _fits(look, reference, space, few, rivals, good) -> Work:
     """Work returning the ``rivals`` (`_trials`) fitted in full: `_Verdict`, scale, `ShapeFit`, `Surface`.
 
-    While none is clearly a face, those most like one are begun again from where the whole of them lies now: a trial knows
-    turn and size of a face to ten degrees and a tenth; what those are off goes into the shape, and comes out of it
-    only bit by bit.
+    The first ``good`` of them are; the others while none shows a face, and they must show as much of one as in a thorough
+    look, because the more places are tried, the more like a face is the best of them by chance. While none is clearly a
+    face, those most like one are begun again from where the whole of them lies now, as long as that makes them more like
+    one: a trial knows turn and size of a face to ten degrees and a tenth; what those are off goes into the shape, and
+    comes out of it only bit by bit.
     """
     results = []
     for k, (_, scale, fit, target) in enumerate(rivals):
+        if k >= good and _any_face(results):
+            break
         work = fit_shape(space, target, fit.pose, coefficients=fit.coefficients)
         try:
             fit = yield from run(work, *(0.5 * (k + np.arange(2)) / len(rivals)), FITTING)
         except NoFaceError:
             continue
-        results.append((_judged(reference, space, fit, look.relief), scale, fit, target))
+        relief = look.relief if k < good else LOOKS[-1].relief
+        results.append((_judged(reference, space, fit, relief), scale, fit, target))
     parts = iter(np.linspace(0.5, 1.0, look.again * TURNS + 1))
     done = next(parts)
-    for verdict, scale, fit, target in sorted(results, key=lambda t: -t[0].likeness)[: look.again]:
+    likely = sorted(results, key=lambda t: -t[0].likeness)[: look.again]
+    for k, (verdict, scale, fit, target) in enumerate(likely):
+        if k and _any_face(results):
+            break
         for _ in range(TURNS):
             if max(t[0].likeness for t in results) > CLEAR:
                 return results
@@ -132,9 +143,14 @@ def _fits(look, reference, space, few, rivals) -> Work:
                 break
             verdict = _judged(reference, space, fit, LOOKS[-1].relief)
             results.append((verdict, scale, fit, target))
-            if not start.doubtful and verdict.likeness < start.likeness + 0.01:
+            if verdict.likeness < start.likeness + 0.01:
                 break
     return results
+
+
+def _any_face(results):
+    """Whether one of ``results`` (`_fits`) is taken for a face."""
+    return not all(verdict.doubtful for verdict, *_ in results)
 
 
 def _lies(space, fit) -> Pose:
@@ -162,9 +178,12 @@ class _Verdict(NamedTuple):
 
 
 def _judged(reference, space, fit, relief) -> _Verdict:
-    """What to think of ``fit``, for which ``relief`` is enough."""
+    """What to think of ``fit``, for which ``relief`` is enough.
+
+    Likeness counts twice: a skin that was bent far enough lies near anything.
+    """
     misfit, likeness = misfit_of(space, fit), _likeness(reference, space, fit)
-    return _Verdict(misfit > POOR or likeness < relief, misfit / max(likeness, 0.1), likeness)
+    return _Verdict(misfit > POOR or likeness < relief, misfit / max(likeness, 0.1) ** 2, likeness)
 
 
 def _likeness(reference, space, fit):
