@@ -13,10 +13,11 @@ from ..progress import Progress, Work, portion
 from .confidence import judge, judge_together, sure_as_corners
 from .expression import fit_expression, meeting_lids
 from .picked import picked
-from .placed_face import misfit_of, place_face, run
+from .placed_face import place_face, run
 from .pose_search import LOOKING
 from .shape_space import shape_space
 from .sure import SURE
+from .verdict import misfit_of
 
 #: Landmarks that the shape tells better than the range map.
 OWN = set("v op eu g n se ps pi ex ft ac sbal li ch sa sba pa obs".split())

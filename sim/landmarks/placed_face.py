@@ -2,12 +2,10 @@
 """A face laid on a scan in any turn: placements are tried coarsely, the likeliest fitted in full, and the best judged."""
 
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 
 from ..adapt.closest import Surface
-from ..adapt.relief import face_likeness
 from ..adapt.scan_surface import NORMALS
 from ..adapt.thin_plate_spline import similarity
 from ..anatomy.head import Head
@@ -16,8 +14,9 @@ from ..mesh import Mesh, vertex_normals
 from ..progress import Progress, Work, portion
 from ..scan.face_match import face_template, surface_samples
 from .pose_search import LOOKING, STARTS, SURVIVORS, Pose, search_poses
-from .shape_fit import TRIAL, NoFaceError, ShapeFit, fit_shape
+from .shape_fit import TRIAL, NoFaceError, fit_shape
 from .shape_space import ShapeSpace
+from .verdict import judged, misfit_of
 
 FITTING = "Fitting a face"
 NO_FACE = (
@@ -56,7 +55,6 @@ class Look:
 LOOKS = (Look(1.0, STARTS, SURVIVORS, 10, 3, 1.25, 5, 2, 0.53), Look(0.8, 1000, 400, 14, 4, np.inf, 4, 4, 0.7))
 CLEAR = 0.75  # relief from which on nothing better is looked for
 TURNS = 3  # times that a fit is begun again
-POOR = 2.6  # mm on a head of the reference's size: a mean distance in the face above which there is none
 
 
 def place_face(mesh: Mesh, reference: Head, space: ShapeSpace, unit_scales) -> Work:
@@ -105,7 +103,7 @@ def _trials(look, few, mesh, samples, template, scale) -> Work:
 
 
 def _fits(look, reference, space, few, rivals, good) -> Work:
-    """Work returning the ``rivals`` (`_trials`) fitted in full: `_Verdict`, scale, `ShapeFit`, `Surface`.
+    """Work returning the ``rivals`` (`_trials`) fitted in full: `Verdict`, scale, `ShapeFit`, `Surface`.
 
     The first ``good`` of them are; the others while none shows a face, and they must show as much of one as in a thorough
     look, because the more places are tried, the more like a face is the best of them by chance. While none is clearly a
@@ -123,7 +121,7 @@ def _fits(look, reference, space, few, rivals, good) -> Work:
         except NoFaceError:
             continue
         relief = look.relief if k < good else LOOKS[-1].relief
-        results.append((_judged(reference, space, fit, relief), scale, fit, target))
+        results.append((judged(reference, space, fit, relief), scale, fit, target))
     parts = iter(np.linspace(0.5, 1.0, look.again * TURNS + 1))
     done = next(parts)
     likely = sorted(results, key=lambda t: -t[0].likeness)[: look.again]
@@ -141,7 +139,7 @@ def _fits(look, reference, space, few, rivals, good) -> Work:
                 fit = yield from run(work, (3 * before + done) / 4, done, FITTING)
             except NoFaceError:
                 break
-            verdict = _judged(reference, space, fit, LOOKS[-1].relief)
+            verdict = judged(reference, space, fit, LOOKS[-1].relief)
             results.append((verdict, scale, fit, target))
             if verdict.likeness < start.likeness + 0.01:
                 break
@@ -167,38 +165,6 @@ def _facing(space, target, pose):
     found = target.closest(points[face], 15.0)
     agree = np.einsum("ij,ij->i", found.normals, vertex_normals(points, space.triangles)[face])[found.found]
     return target.turned() if len(agree) and np.median(agree) < 0 else target
-
-
-class _Verdict(NamedTuple):
-    """Whether a fit is doubtful as a face, how bad it is, and how much relief of a face the scan has under it."""
-
-    doubtful: bool
-    bad: float
-    likeness: float
-
-
-def _judged(reference, space, fit, relief) -> _Verdict:
-    """What to think of ``fit``, for which ``relief`` is enough.
-
-    Likeness counts twice: a skin that was bent far enough lies near anything.
-    """
-    misfit, likeness = misfit_of(space, fit), _likeness(reference, space, fit)
-    return _Verdict(misfit > POOR or likeness < relief, misfit / max(likeness, 0.1) ** 2, likeness)
-
-
-def _likeness(reference, space, fit):
-    """How much relief of a face the scan has where the skin was laid on it, see `adapt.likeness`."""
-    skin = reference.skin.vertices @ fit.matrix.T + fit.pose.shift
-    fitted = np.zeros(len(skin))
-    skin[space.vertices], fitted[space.vertices] = fit.points, fit.trust
-    return face_likeness(reference, skin, fitted)
-
-
-def misfit_of(space: ShapeSpace, fit: ShapeFit) -> float:
-    """Mean distance of the face to the scan, mm; what found nothing counts as far."""
-    weight = space.area * (space.face > 0.5)
-    distance = np.where(np.isfinite(fit.distance), np.abs(fit.distance), 6.0)
-    return float(np.average(distance, weights=weight)) / fit.pose.scale
 
 
 def run(work, start: float, stop: float, label: str) -> Work:

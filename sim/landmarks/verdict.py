@@ -1,0 +1,45 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Whether what a skin was laid on is a face: how near it lies, and how much of a face's relief is there."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..adapt.relief import face_likeness
+from ..anatomy.head import Head
+from .shape_fit import ShapeFit
+from .shape_space import ShapeSpace
+
+POOR = 2.6  # mm on a head of the reference's size: a mean distance in the face above which there is none
+
+
+class Verdict(NamedTuple):
+    """Whether a fit is doubtful as a face, how bad it is, and how much relief of a face the scan has under it."""
+
+    doubtful: bool
+    bad: float
+    likeness: float
+
+
+def judged(reference: Head, space: ShapeSpace, fit: ShapeFit, relief: float) -> Verdict:
+    """What to think of ``fit``, for which ``relief`` is enough.
+
+    Likeness counts twice: a skin that was bent far enough lies near anything.
+    """
+    misfit, likeness = misfit_of(space, fit), likeness_of(reference, space, fit)
+    return Verdict(misfit > POOR or likeness < relief, misfit / max(likeness, 0.1) ** 2, likeness)
+
+
+def likeness_of(reference: Head, space: ShapeSpace, fit: ShapeFit) -> float:
+    """How much relief of a face the scan has where the skin was laid on it, see `adapt.relief`."""
+    skin = reference.skin.vertices @ fit.matrix.T + fit.pose.shift
+    fitted = np.zeros(len(skin))
+    skin[space.vertices], fitted[space.vertices] = fit.points, fit.trust
+    return face_likeness(reference, skin, fitted)
+
+
+def misfit_of(space: ShapeSpace, fit: ShapeFit) -> float:
+    """Mean distance of the face to the scan, mm; what found nothing counts as far."""
+    weight = space.area * (space.face > 0.5)
+    distance = np.where(np.isfinite(fit.distance), np.abs(fit.distance), 6.0)
+    return float(np.average(distance, weights=weight)) / fit.pose.scale
