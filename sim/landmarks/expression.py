@@ -20,9 +20,12 @@ LOOKED = np.linspace(-0.28, 0.28, 9)  # shares of the way from the middle of the
 EYE_LINES, ACROSS, LINE = np.linspace(0.25, 0.75, 11), 9.0, 60
 HOLE, HOLED = 1.2, 0.3
 HOLED_SHUT = 0.45  # the same of eyes that the skin says are shut: lashes have holes as well
-#: mm on a head of the reference's size between the edges of lips that are parted: where a fit with parted lips lies better as
-#: well, half of what they are apart must be seen to be in a smile with teeth. Noise parts closed lips by 2.9.
+#: mm on a head of the reference's size between the edges of lips that are parted: noise parts closed lips by 2.9, a tube
+#: between them by 6, a smile with teeth by 12.
 APART = 4.0
+NO_WORSE = (
+    1.05  # how far from the scan lips that are parted may lie, against closed ones: two fits differ as much by chance
+)
 FEW = 25  # percent of them at which lips that are parted may seem closed: noise looks like edges in places only
 
 
@@ -31,7 +34,7 @@ def fit_expression(space: ShapeSpace, target: Surface, fit: ShapeFit):
     moved = fit.coefficients + space.parted
     free = yield from _half(fit_shape(space, target, fit.pose, CHANGE, moved, 1, Expression(True)), 0.0)
     mouth = about_mouth(space)
-    parted = lips_parted(space, free, target) and cost(space, free, mouth) < cost(space, fit, mouth)
+    parted = lips_parted(space, free, target) and cost(space, free, mouth) < NO_WORSE * cost(space, fit, mouth)
     fit = free if parted else fit
     holes = holes_in_eyes(space.landmarks(fit.points), fit.matrix, target)
     if holes < HOLED_SHUT and min(shut_share(space, fit).values()) > SHUT:
