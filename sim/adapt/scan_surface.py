@@ -5,6 +5,7 @@ import numpy as np
 
 from ..anatomy.head import Head
 from ..mesh import Mesh
+from ..scan.flat_cuts import beyond, flat_cuts
 from .closest import Surface
 from .thin_plate_spline import similarity
 
@@ -17,11 +18,12 @@ def scan_surface(reference: Head, scan: Mesh, given: dict[str, np.ndarray], most
     """The surface of ``scan`` (mm, any place) that the reference is fitted to.
 
     given : name -> (3,) mm, landmarks that tell where the head is. A scan of more than ``most`` triangles is cut to the
-    head's neighbourhood, unless the landmarks lie elsewhere, and thinned (`Surface.coarser`).
+    head's neighbourhood, unless the landmarks lie elsewhere, and thinned (`Surface.coarser`). Flat ends are left out
+    (`flat_cuts`).
     """
     triangles = scan.triangles
     if len(triangles) <= most:
-        return Surface(scan.vertices, triangles, NORMALS)
+        return without_cuts(Surface(scan.vertices, triangles, NORMALS))
     rest = reference.landmark_positions()
     names = [name for name in given if name in rest]
     matrix, shift = similarity([rest[name] for name in names], [given[name] for name in names])
@@ -30,4 +32,16 @@ def scan_surface(reference: Head, scan: Mesh, given: dict[str, np.ndarray], most
     near = ((scan.vertices > head.min(axis=0) - margin) & (scan.vertices < head.max(axis=0) + margin)).all(axis=1)
     kept = near[triangles].all(axis=1)
     some = triangles[kept] if kept.sum() > most / 10 else triangles
-    return Surface(scan.vertices, some, NORMALS).coarser(most)
+    return without_cuts(Surface(scan.vertices, some, NORMALS).coarser(most))
+
+
+def without_cuts(surface: Surface) -> Surface:
+    """``surface`` without its flat ends: there it stops, and what lies beyond is to be invented."""
+    planes = cuts_of(surface)
+    cut = beyond(planes, surface.vertices)[surface.triangles].any(axis=1)
+    return Surface(surface.vertices, surface.triangles[~cut], NORMALS) if cut.any() else surface
+
+
+def cuts_of(surface: Surface) -> np.ndarray:
+    """(k, 4) planes of its flat ends, see `flat_cuts`."""
+    return flat_cuts(surface.vertices, surface.triangles, surface.face_normals, surface.area)

@@ -7,6 +7,8 @@ from scipy.spatial import cKDTree
 from ..adapt.closest import Surface
 from ..adapt.completion import sigma
 from ..adapt.ears import EAR_MARKS, MOST_MARKS
+from ..adapt.scan_surface import cuts_of
+from ..scan.flat_cuts import beyond
 from .shape_fit import ShapeFit
 from .shape_space import ShapeSpace
 from .sure import SURE
@@ -41,13 +43,15 @@ def support(space: ShapeSpace, fit: ShapeFit) -> dict[str, float]:
 
 
 def judge(space: ShapeSpace, fit: ShapeFit, target: Surface, positions):
-    """Confidence {name: 0..1}, names in mid-air, names that are missing."""
+    """Confidence {name: 0..1}, names in mid-air, names that are missing. What lies on a flat end, which is no skin, is
+    as good as in mid-air."""
     doubts, supports = doubt(space, fit), support(space, fit)
     names = list(positions)
-    off = target.closest(np.array([positions[n] for n in names])).distance
+    at = np.array([positions[n] for n in names])
+    off = (target.closest(at).distance > MID_AIR) | beyond(cuts_of(target), at)
     confidence = {n: (0.3 + 0.7 * min(1.0, 1.6 * supports[n])) / (1 + (doubts[n] / UNSURE) ** 2) for n in names}
     missing = tuple(n for n in names if doubts[n] > LOST and supports[n] < 0.1)
-    mid_air = tuple(n for k, n in enumerate(names) if off[k] > MID_AIR and n not in missing)
+    mid_air = tuple(n for k, n in enumerate(names) if off[k] and n not in missing)
     for n in mid_air:
         confidence[n] *= 0.4
     return confidence, mid_air, missing
