@@ -70,6 +70,8 @@ def build_head(
     ------
     InputError : the landmarks are too few, do not form a face, or do not belong to this scan; or no good fit was found.
     """
+    from ..landmarks.shut_lids import with_shut_lids
+
     given = {n: np.asarray(p, dtype=float) for n, p in landmarks.items() if n in SKIN}
     require_usable(given, "The landmark set")
     require_choice(relax)
@@ -80,7 +82,8 @@ def build_head(
     check_arrangement(reference.landmark_positions(), given)
     yield Progress(0.08, "Judging the landmarks")
     check_on_surface(given, target)
-    fit = yield from portion(fit_skin(reference, target, given), 0.1, 0.6)
+    told = yield from portion(with_shut_lids(reference, target, given), 0.1, 0.3)
+    fit = yield from portion(fit_skin(reference, target, told), 0.3, 0.6)
     yield Progress(0.6, "Judging the fit")
     refuse_poor(fit_report(reference, fit, given))
     check_likeness(fit.reference, fit.cage, fit.fitted.fitted)
