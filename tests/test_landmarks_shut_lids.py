@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Eyes scanned shut are told from the scan where the landmarks given say nothing of their lids."""
+
+import numpy as np
+import pytest
+
+from headshop.sim.adapt.closest import Surface
+from headshop.sim.adapt.shut_eyes import with_shut_eyes
+from headshop.sim.landmarks.shut_lids import with_shut_lids
+from headshop.sim.mesh_subdivision import drawn
+from headshop.sim.progress import finish
+
+TWELVE = ("n", "prn", "sn", "en_l", "en_r", "ex_l", "ex_r", "ch_l", "ch_r", "gn", "t_l", "t_r")
+LIDS = ("ps_l", "pi_l", "ps_r", "pi_r")
+
+
+@pytest.fixture(scope="module")
+def scans(reference):
+    """Sides of shut eyes -> landmarks, and the skin as a scanner sees it."""
+    out = {}
+    for sides in ((), ("l", "r")):
+        head = with_shut_eyes(reference, sides)
+        seen = (head.groups["inner"] < 0.5)[head.skin.triangles].all(axis=1)
+        target = Surface(drawn(head.skin.faces, head.skin.vertices), head.skin.triangles[seen], smooth=2.0)
+        out[sides] = head.landmark_positions(), target
+    return out
+
+
+def test_lids_that_meet_are_told_and_where(reference, scans):
+    marks, target = scans["l", "r"]
+    told = finish(with_shut_lids(reference, target, {name: marks[name] for name in TWELVE}))
+    assert set(told) == {*TWELVE, *LIDS}
+    for side in "lr":
+        np.testing.assert_array_equal(told[f"ps_{side}"], told[f"pi_{side}"])
+        assert np.linalg.norm(told[f"ps_{side}"] - (marks[f"ps_{side}"] + marks[f"pi_{side}"]) / 2) < 4
+
+
+def test_open_eyes_and_lids_that_are_given_stay_as_they_are(reference, scans):
+    marks, target = scans[()]
+    given = {name: marks[name] for name in TWELVE}
+    assert finish(with_shut_lids(reference, target, given)) == given
+    marks, target = scans["l", "r"]
+    every = {name: marks[name] for name in (*TWELVE, *LIDS)}
+    assert finish(with_shut_lids(reference, target, every)) == every
+    one = {name: marks[name] for name in (*TWELVE, "ps_l")}
+    assert set(finish(with_shut_lids(reference, target, one))) == {*one, "ps_r", "pi_r"}
+
+
+def test_where_no_face_lies_nothing_is_told(reference, scans):
+    marks, target = scans["l", "r"]
+    away = {name: marks[name] + [0, 4000, 0] for name in TWELVE}
+    assert finish(with_shut_lids(reference, target, away)) == away
