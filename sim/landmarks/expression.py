@@ -6,7 +6,8 @@ from scipy.spatial import cKDTree
 
 from ..adapt.closest import Surface
 from ..relax.mouth_gap import depths, lip_edges
-from .shape_fit import CHANGE, Expression, ShapeFit, fit_shape
+from .mouth_outline import MouthOutline, mouth_outline
+from .shape_fit import CHANGE, Expression, ShapeFit, Told, fit_shape
 from .shape_space import ShapeSpace
 
 AROUND_EYE = 22.0  # mm
@@ -32,16 +33,22 @@ FEW = 25  # percent of them at which lips that are parted may seem closed: noise
 def fit_expression(space: ShapeSpace, target: Surface, fit: ShapeFit):
     """A generator: yields the fraction done, returns the `ShapeFit` and the `Expression` that the scan shows."""
     moved = fit.coefficients + space.parted
-    free = yield from _half(fit_shape(space, target, fit.pose, CHANGE, moved, 1, Expression(True)), 0.0)
+    free = yield from _third(fit_shape(space, target, fit.pose, CHANGE, moved, 1, Expression(True)), 0)
+    outline = outline_of(space, free, target)
+    told = None if outline is None else told_of_mouth(space, outline)
+    if told is not None:
+        work = fit_shape(space, target, free.pose, CHANGE, free.coefficients, 1, Expression(True), told)
+        free = yield from _third(work, 1)
+    gap = told is not None or lips_parted(space, free, target)
     mouth = about_mouth(space)
-    parted = lips_parted(space, free, target) and cost(space, free, mouth) < NO_WORSE * cost(space, fit, mouth)
-    fit = free if parted else fit
+    parted = gap and cost(space, free, mouth) < NO_WORSE * cost(space, fit, mouth)
+    fit, told = (free, told) if parted else (fit, None)
     holes = holes_in_eyes(space.landmarks(fit.points), fit.matrix, target)
     if holes < HOLED_SHUT and min(shut_share(space, fit).values()) > SHUT:
         return fit, Expression(parted, ("l", "r"))
     shut = Expression(parted, ("l", "r"))
     moved = fit.coefficients + space.shut["l"] + space.shut["r"]
-    rival = yield from _half(fit_shape(space, target, fit.pose, CHANGE, moved, 1, shut), 0.5)
+    rival = yield from _third(fit_shape(space, target, fit.pose, CHANGE, moved, 1, shut, told), 2)
     about = eyes(space)
     if holes < HOLED and cost(space, rival, about) < REASON * cost(space, fit, about):
         return rival, shut
@@ -53,13 +60,28 @@ def shut_share(space: ShapeSpace, fit: ShapeFit) -> dict[str, float]:
     return {side: float(fit.coefficients @ shut / (shut @ shut)) for side, shut in space.shut.items()}
 
 
-def _half(work, start):
+def outline_of(space: ShapeSpace, fit: ShapeFit, target: Surface) -> MouthOutline | None:
+    """`mouth_outline` of the scan, looked for where the lips of ``fit`` are."""
+    return mouth_outline(target, space.landmarks(fit.points), -fit.pose.turn[:, 1], fit.pose.scale)
+
+
+def told_of_mouth(space: ShapeSpace, outline: MouthOutline) -> Told:
+    """What the ``outline`` of a parted mouth tells of the skin: where its corners and the middle of its lips are."""
+    marks = [space.names.index(name) for name in outline.corners]
+    middle = np.abs(space.points[space.lips[0], 0]).argmin()
+    edges = np.array([lip[middle] for lip in space.lips])
+    corners = np.concatenate([space.corners[marks], np.repeat(edges[:, None], 3, axis=1)])
+    weights = np.concatenate([space.weights[marks], np.tile([1.0, 0.0, 0.0], (2, 1))])
+    return Told(corners, weights, np.array([*outline.corners.values(), outline.upper, outline.lower]))
+
+
+def _third(work, before):
     while True:
         try:
             done = next(work)
         except StopIteration as end:
             return end.value
-        yield start + 0.5 * done
+        yield (before + done) / 3
 
 
 def lips_parted(space: ShapeSpace, free: ShapeFit, target: Surface) -> bool:

@@ -11,7 +11,7 @@ from ..cylindrical.second_opinion import weighed
 from ..mesh import Mesh
 from ..progress import Progress, Work, portion
 from .confidence import judge, judge_together, sure_as_corners
-from .expression import fit_expression, meeting_lids
+from .expression import fit_expression, meeting_lids, outline_of
 from .picked import picked
 from .placed_face import place_face, run
 from .pose_search import LOOKING
@@ -82,5 +82,8 @@ def find_landmarks(mesh: Mesh, reference: Head | None = None, unit_scales=(1.0,)
     positions |= met
     mid_air = tuple(n for n in mid_air if n not in met)
     confidence |= {n: max(confidence[n], sure_as_corners(confidence, n)) for n in met}
+    outline = outline_of(space, fit, target) if shown.parted else None
+    if outline is not None:
+        positions |= {n: p for n, p in outline.corners.items() if n in positions}
     confidence = judge_together(positions, confidence, mid_air, reference.landmark_positions(), shown.shut)
     return FoundLandmarks(positions, confidence, mid_air, missing, scale, misfit)

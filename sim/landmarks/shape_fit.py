@@ -33,6 +33,7 @@ BEND = 5.0  # how much better a place is that faces the same way, see `Surface.r
 AGREE = 0.45  # cosine between the normals of skin and scan
 LEAST = 60  # points of the skin that must find the scan
 PATCH = 40.0  # mm²: so much of the surface says one thing
+TOLD = 1.0  # mm by which a place that is told may be wrong
 TILT = 0.05  # rad of turn, and fraction of size, that count as much as 1 standard deviation
 
 
@@ -49,6 +50,15 @@ class Expression:
 
 
 REST = Expression()
+
+
+@dataclass(frozen=True, eq=False)
+class Told:
+    """Places (k, 3) mm on the scan of points of the skin: corners (k, 3), weights (k, 3) : where those ride on its points."""
+
+    corners: np.ndarray
+    weights: np.ndarray
+    places: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,12 +84,19 @@ class ShapeFit:
 
 
 def fit_shape(
-    space: ShapeSpace, target: Surface, pose: Pose, rounds=SCHEDULE, coefficients=None, every=1, expression=REST
+    space: ShapeSpace,
+    target: Surface,
+    pose: Pose,
+    rounds=SCHEDULE,
+    coefficients=None,
+    every=1,
+    expression=REST,
+    told: Told | None = None,
 ):
     """A generator: yields the fraction done, returns the `ShapeFit` that begins at ``pose``.
 
     coefficients (k,) : to begin with, of the first k modes; every : look at each so many-th point of the skin only;
-    expression : what lips and lids are taken to do
+    expression : what lips and lids are taken to do; told : what is known besides (None: nothing)
 
     Raises
     ------
@@ -105,14 +122,7 @@ def fit_shape(
         height = np.einsum("ij,ij->i", gap, across)
         weight = every * trust[use] * space.area[use] / PATCH / (1 + (height / width) ** 2) ** 2 / noise**2
         # Unknowns: a small turn about the face, a shift, a change of size, and the coefficients.
-        arm = shaped[use] - middle
-        rigid = np.zeros((len(use), 3, 7))
-        rigid[:, 0, 1], rigid[:, 0, 2] = arm[:, 2], -arm[:, 1]
-        rigid[:, 1, 0], rigid[:, 1, 2] = -arm[:, 2], arm[:, 0]
-        rigid[:, 2, 0], rigid[:, 2, 1] = arm[:, 1], -arm[:, 0]
-        rigid[:, :, 3:6] = np.eye(3)
-        rigid[:, :, 6] = arm
-        rows = np.concatenate([rigid, space.modes[use]], axis=2)
+        rows = np.concatenate([_rigid(shaped[use] - middle), space.modes[use]], axis=2)
         right = gap + space.modes[use] @ coefficients
         one = (across[:, None, :] @ rows)[:, 0]
         few = slice(None, None, 4)  # the pull along the surface only steadies what the normals leave open
@@ -121,6 +131,13 @@ def fit_shape(
         heavy = one * weight[:, None]
         system = heavy.T @ one + (flat * wide[:, None]).T @ flat
         pull = heavy.T @ np.einsum("ki,ki->k", across, right) + flat.T @ (wide * right[few].ravel())
+        if told is not None:
+            own = np.einsum("kij,ki->kj", shaped[told.corners], told.weights)
+            modes = np.einsum("kijm,ki->kjm", space.modes[told.corners], told.weights)
+            rows = np.concatenate([_rigid(own - middle), modes], axis=2).reshape(-1, 7 + m) / TOLD
+            off = ((told.places - shift) @ turn) / scale - own + modes @ coefficients
+            system += rows.T @ rows
+            pull += rows.T @ (off.ravel() / TOLD)
         prior = np.full(7 + m, 1 / variance)
         prior[[0, 1, 2, 6]] = 1e-3 / TILT**2
         prior[3:6] = 1e-6
@@ -156,6 +173,17 @@ def pairs(space: ShapeSpace, points, target: Surface, reach, looking=slice(None)
     trust[looking] = np.where(found.found & ~found.border, np.clip((agree - AGREE) / (1 - AGREE) * 1.5, 0.05, 1), 0)
     place[looking], across[looking] = found.points, found.normals
     return place, trust, across
+
+
+def _rigid(arm):
+    """(k, 3, 7): how points at ``arm`` (k, 3) from the middle answer to a small turn, a shift and growth."""
+    out = np.zeros((len(arm), 3, 7))
+    out[:, 0, 1], out[:, 0, 2] = arm[:, 2], -arm[:, 1]
+    out[:, 1, 0], out[:, 1, 2] = -arm[:, 2], arm[:, 0]
+    out[:, 2, 0], out[:, 2, 1] = arm[:, 1], -arm[:, 0]
+    out[:, :, 3:6] = np.eye(3)
+    out[:, :, 6] = arm
+    return out
 
 
 def _rotation(vector):

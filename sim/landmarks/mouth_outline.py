@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The outline of a parted mouth: its corners, where the gap between the lips ends, and the lips' edges in its middle.
+
+How far a smile goes no neutral head tells, but the scan shows it: between parted lips it has nothing, or teeth set back.
+From the middle of the mouth that gap is followed to either side, until the lips meet.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..adapt.closest import Surface
+from ..relax.mouth_gap import SPECK, STEP, depths
+from ..relax.parted import APART
+from ..relax.smile import CORNERS
+
+ASIDE, DOWN = 1.0, 0.5  # mm from column to column, and from place to place in one
+WIDE, ABOVE = 46.0, 12.0  # mm to either side of the middle, and above the upper lip, that are looked at
+MIDDLE = np.array([0.0, 2.0, -2.0, 4.0, -4.0])  # mm: columns in one of which the gap is looked for first
+BEHIND = 1.5  # mm: what lies deeper than this behind the line from lip to lip is within the mouth
+DRIFT = 1.5  # mm that an edge of the gap may rise or fall from one column to the next
+BESIDE = 2.0  # mm above and below the gap within which the lips are looked for
+NARROW = 25.0  # mm between corners below which it is no mouth
+NEAR = 6.0  # mm from where the gap ends to the scan
+
+
+@dataclass(frozen=True, eq=False)
+class MouthOutline:
+    """corners : ``ch_l`` and ``ch_r`` -> (3,) mm; upper, lower (3,) mm : where the lips end in the middle."""
+
+    corners: dict[str, np.ndarray]
+    upper: np.ndarray
+    lower: np.ndarray
+
+
+def mouth_outline(target: Surface, marks, forward, scale: float = 1.0) -> MouthOutline | None:
+    """The `MouthOutline` of a scan whose lips are parted; None: there is no gap.
+
+    marks : name -> (3,) mm, where about ``ls``, ``pg``, ``ch_l`` and ``ch_r`` lie; forward : (3,) unit vector, out of the face;
+    scale : mm on the scan per mm of the reference
+    """
+    places, depth = looked_at(target, marks, forward, scale)
+    start = middle_gap(depth)
+    if start is None:
+        return None
+    column, *lips = start
+    upper, lower = places[column, lips] - scale * depth[column, lips, None] * forward
+    corners = []
+    for step in (1, -1):
+        end, *lips = gap_end(depth, *start, step)
+        behind = depth[end, lips][np.isfinite(depth[end, lips])]
+        corners.append(places[end, lips].mean(axis=0) - scale * (behind.mean() if len(behind) else 0.0) * forward)
+    found = target.closest(np.array(corners), NEAR * scale)
+    if not found.found.all() or np.linalg.norm(np.subtract(*found.points)) < NARROW * scale:
+        return None
+    return MouthOutline(dict(zip(CORNERS, found.points, strict=True)), upper, lower)
+
+
+def looked_at(target: Surface, marks, forward, scale: float):
+    """Columns of places (c, r, 3) mm before the mouth, from its right to its left, from above downward, and how deep (c, r)
+    the scan lies behind them, in mm of the reference."""
+    across = marks["ch_l"] - marks["ch_r"]
+    across = across - across @ forward * forward
+    half = np.linalg.norm(across) / 2
+    across /= 2 * half
+    up = np.cross(forward, across)
+    aside = scale * np.arange(-WIDE, WIDE + ASIDE / 2, ASIDE)
+    above = np.arange(scale * ABOVE, (marks["pg"] - marks["ls"]) @ up, -scale * DOWN)
+    # The corners lie farther back than the middle: the columns stand on an arch.
+    back = ((marks["ch_l"] + marks["ch_r"]) / 2 - marks["ls"]) @ forward * (aside / half) ** 2
+    arch = marks["ls"] + aside[:, None] * across + back[:, None] * forward
+    places = arch[:, None] + above[:, None] * up
+    depth = depths(target, places.reshape(-1, 3), forward).reshape(places.shape[:2])
+    return places, depth / scale
+
+
+def middle_gap(depth):
+    """Column, last place of the upper and first place of the lower lip, where a gap is seen in the middle; None: nowhere, or in
+    few columns, as a hole in the scan would be.
+
+    depth (c, r) mm, see `looked_at`
+    """
+    top, found = int(ABOVE / DOWN), []
+    for column in len(depth) // 2 + (MIDDLE / ASIDE).astype(int):
+        lips = widest_gap(depth[column, top:])
+        if lips is not None:
+            found.append((column, top + lips[0], top + lips[1]))
+    return found[0] if len(found) > len(MIDDLE) / 2 else None
+
+
+def widest_gap(line):
+    """Last place of the upper and first place of the lower lip on a ``line`` (r,) of depths from one to below the other, mm;
+    None: there is no gap.
+
+    What lies before the way from lip to lip is a lip itself, and no tooth: above it is a crease then, and under it a hole.
+    """
+    there = np.flatnonzero(np.isfinite(line))
+    ends = np.flatnonzero((np.diff(there) > 1 + SPECK / DOWN) | (np.abs(np.diff(line[there])) > STEP))
+    for end in ends[::-1]:
+        upper, lower = there[ends[0]], there[end + 1]
+        before = way(line[upper], line[lower], lower - upper + 1) - line[upper : lower + 1] > BEHIND
+        if (lower - upper) * DOWN > APART and not before.any():
+            return upper, lower
+    return None
+
+
+def way(one: float, other: float, count: int) -> np.ndarray:
+    """(count,) depths from ``one`` to the ``other`` lip, mm."""
+    return np.linspace(one, other, count)
+
+
+def gap_end(depth, column: int, upper: int, lower: int, step: int):
+    """The last column, going by ``step``, that a gap reaches from ``column``, with the lips' edges there, as `middle_gap`."""
+    drift, beside, speck = int(DRIFT / DOWN), int(BESIDE / DOWN), int(SPECK / DOWN)
+    while 0 <= column + step < len(depth):
+        line = depth[column + step]
+        first, last = max(upper - drift, 0), min(lower + drift, len(line) - 1)
+        over, under = line[max(first - beside, 0) : first + 1], line[last : last + beside + 1]
+        over, under = over[np.isfinite(over)], under[np.isfinite(under)]
+        if len(over) == 0 or len(under) == 0:
+            break
+        deep = ~(line[first : last + 1] <= way(over[-1], under[0], last + 1 - first) + BEHIND)  # so is where no data is
+        gap = first + np.flatnonzero(deep)
+        if len(gap) <= speck:
+            break
+        column, upper, lower = column + step, max(gap[0] - 1, 0), min(gap[-1] + 1, len(line) - 1)
+    return column, upper, lower

@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The outline of a parted mouth: its corners are where the gap between the lips ends, whatever a first guess says."""
+
+import json
+
+import numpy as np
+import pytest
+
+from headshop.sim.adapt.closest import Surface
+from headshop.sim.landmarks.find import find_landmarks
+from headshop.sim.landmarks.mouth_outline import DOWN, gap_end, mouth_outline, widest_gap
+from headshop.sim.progress import finish
+from headshop.sim.scan.clean import clean_scan
+from headshop.sim.scan.ply import read_ply
+
+HALF, OPEN, RISE = 25.0, 16.0, 6.0  # mm: half the mouth's width, how far it is open, how far its corners are raised
+FORWARD = np.array([0.0, -1.0, 0.0])
+
+
+def _face(gap=True, teeth=False):
+    """A rounded surface with a gap in it like that between smiling lips, and teeth behind it, if any."""
+    x, z = np.meshgrid(np.arange(-60, 60.1, 0.8), np.arange(-60, 40.1, 0.8))
+    points = np.stack([x, x**2 / 40, z], axis=2).reshape(-1, 3)
+    k = np.arange(x.size).reshape(x.shape)
+    a, b, c, d = k[:-1, :-1].ravel(), k[:-1, 1:].ravel(), k[1:, 1:].ravel(), k[1:, :-1].ravel()
+    triangles = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
+    across, _, up = points[triangles].mean(axis=1).T
+    share = across / HALF
+    inside = np.abs(up - RISE * share**2) < OPEN / 2 * (1 - share**2)
+    if not gap:
+        return Surface(points, triangles)
+    if not teeth:
+        return Surface(points, triangles[~inside])
+    back = points + [0.0, 5.0, 0.0]
+    return Surface(
+        np.concatenate([points, back]), np.concatenate([triangles[~inside], triangles[inside] + len(points)])
+    )
+
+
+def _guess():
+    """Landmarks as somebody might guess them: the corners half a centimetre too far out."""
+    wide = HALF + 5
+    places = {"ls": (0, 0, 14), "li": (0, 0, -16), "pg": (0, 0, -34), "ch_l": (wide, 20, 2), "ch_r": (-wide, 20, 2)}
+    return {name: np.array(place, dtype=float) for name, place in places.items()}
+
+
+@pytest.mark.parametrize("teeth", [False, True])
+def test_corners_are_where_the_gap_ends(teeth):
+    found = mouth_outline(_face(teeth=teeth), _guess(), FORWARD)
+    for name, side in (("ch_l", 1), ("ch_r", -1)):
+        assert found.corners[name] == pytest.approx([side * HALF, HALF**2 / 40, RISE], abs=2.5)
+    assert found.upper == pytest.approx([0, 0, OPEN / 2], abs=1.0)
+    assert found.lower == pytest.approx([0, 0, -OPEN / 2], abs=1.0)
+
+
+def test_corners_are_the_same_on_a_turned_small_scan():
+    face, scale = _face(), 0.8
+    turn = np.linalg.qr(np.random.default_rng(2).standard_normal((3, 3)))[0]
+    turn *= np.sign(np.linalg.det(turn))
+    small = Surface(scale * face.vertices @ turn.T, face.triangles)
+    guess = {name: scale * turn @ place for name, place in _guess().items()}
+    straight, found = mouth_outline(face, _guess(), FORWARD), mouth_outline(small, guess, turn @ FORWARD, scale)
+    for name, place in straight.corners.items():
+        assert found.corners[name] == pytest.approx(scale * turn @ place, abs=1.5)  # a column more or less
+
+
+def test_closed_lips_have_no_outline():
+    assert mouth_outline(_face(gap=False), _guess(), FORWARD) is None
+
+
+def test_a_hole_in_few_columns_is_no_mouth():
+    face = _face(gap=False)
+    x, _, z = face.vertices[face.triangles].mean(axis=1).T
+    hole = (np.abs(x - 1) < 1.5) & (np.abs(z) < 5)
+    assert mouth_outline(Surface(face.vertices, face.triangles[~hole]), _guess(), FORWARD) is None
+
+
+def test_the_lower_lip_between_a_crease_and_a_hole_under_it_is_no_tooth():
+    upper, crease, hole = np.linspace(0, 3, 10), np.full(6, np.nan), np.full(10, np.nan)
+    lip, teeth, chin = 5 + np.linspace(-1, 1, 20) ** 2, np.full(20, 12.0), np.full(20, 16.0)
+    assert widest_gap(np.concatenate([upper, crease, lip, hole, chin])) is None
+    first, last = widest_gap(np.concatenate([upper, crease, teeth, hole, chin]))
+    assert (first, last) == (9, 46) and (last - first) * DOWN > 18
+
+
+def test_a_speck_beside_the_mouth_does_not_widen_it():
+    depth = np.zeros((60, 60))
+    depth[20:40, 20:40] = np.nan  # the mouth
+    depth[40:45, 29:31] = np.nan  # a crack of 1 mm that goes on from its corner
+    assert gap_end(depth, 30, 19, 40, 1) == (39, 19, 40)
+    assert gap_end(depth, 30, 19, 40, -1) == (20, 19, 40)
+
+
+@pytest.mark.parametrize("name", ["s1", "s2"])
+def test_corners_of_smiling_subjects(shared, reference, name):
+    scan = shared / "ict" / "examples" / f"{name}_smile_scan.ply"
+    if not scan.is_file():
+        pytest.skip(f"no {scan.name} in {scan.parent}")
+    truth = json.loads(scan.with_name(f"{name}_smile_truth.json").read_text(encoding="utf-8"))["landmarks"]
+    found = finish(find_landmarks(clean_scan(read_ply(scan))[0], reference)).positions
+    assert max(np.linalg.norm(found[corner] - truth[corner]) for corner in ("ch_l", "ch_r")) < 2.5
