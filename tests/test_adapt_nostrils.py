@@ -43,6 +43,8 @@ def test_nostrils_lead_to_the_aperture_where_no_data_is(reference, rest):
     assert (moved[np.setdiff1d(np.arange(len(skin)), rows)] == 0).all()
     deep = rows[rest.behind[rows] > 1]
     assert moved[deep, 1].min() > 8
+    septum = 2 * np.abs((skin + moved)[deep, 0]).min()
+    assert 3.0 < septum < 6.0
     hindmost = (skin + moved)[rows, 1].max()
     assert abs(hindmost - reference.skull_landmark_positions()["ans"][1]) < 8
     head = finish(follow(reference, skin, None, moved)).head

@@ -17,6 +17,9 @@ from .thin_plate_spline import similarity
 #: mm by which the lining leads farther back than the reference's, by edges behind the rim of a nostril: its end then lies
 #: in the aperture of the reference's own skull.
 BACK = (2.0, 11.0, 14.0)
+#: mm by which the wall toward the midline lies nearer to it, likewise: a septum with its lining is some 5 mm thick (our own
+#: estimate), that between the reference's pockets 8.
+IN = (0.7, 1.5, 0.0)
 UP = 3.0  # mm by which it leads farther up, except over the floor
 HOLD = (0.2, 1.0, 1.0)  # pull of the lining to its place, likewise, against the energy of bending
 DEEPER = 1.5  # times as far within a nostril data is looked for that shows it deeper
@@ -50,6 +53,9 @@ def _moved(rest: Rest, rows, skin, target: Surface):
     place = start[rows].copy()
     place[:, 1] += np.array(BACK)[step]
     hind = (start[rows, 1] - start[rim, 1].mean()) / (np.ptp(start[rim, 1]) / 2)
+    aside = np.abs(start[rows, 0])
+    low, high = aside[step > 0].min(), aside[step > 0].max()
+    place[:, 0] -= np.sign(start[rows, 0]) * np.array(IN)[step] * np.clip((high - aside) / (high - low), 0, 1)
     place[:, 2] += UP * np.clip(1 - hind, 0, 1) * (step > 0)
     place = place @ matrix.T + shift
     place = bounded(target, skin[rim].mean(axis=0), place)
