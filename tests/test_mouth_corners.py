@@ -2,13 +2,16 @@
 """The outline of a parted mouth: its corners are where the gap between the lips ends, whatever a first guess says."""
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from headshop.sim.adapt.closest import Surface
+from headshop.sim.landmarks.expression import lips_ajar
 from headshop.sim.landmarks.find import find_landmarks
 from headshop.sim.landmarks.mouth_outline import DOWN, gap_end, mouth_outline, widest_gap
+from headshop.sim.landmarks.pose_search import Pose
 from headshop.sim.progress import finish
 from headshop.sim.scan.clean import clean_scan
 from headshop.sim.scan.ply import read_ply
@@ -17,8 +20,8 @@ HALF, OPEN, RISE = 25.0, 16.0, 6.0  # mm: half the mouth's width, how far it is 
 FORWARD = np.array([0.0, -1.0, 0.0])
 
 
-def _face(gap=True, teeth=False):
-    """A rounded surface with a gap in it like that between smiling lips, and teeth behind it, if any."""
+def _face(gap=True, teeth=False, wide=OPEN):
+    """A rounded surface with a gap in it like that between smiling lips, ``wide`` mm, and teeth behind it, if any."""
     x, z = np.meshgrid(np.arange(-60, 60.1, 0.8), np.arange(-60, 40.1, 0.8))
     points = np.stack([x, x**2 / 40, z], axis=2).reshape(-1, 3)
     k = np.arange(x.size).reshape(x.shape)
@@ -26,7 +29,7 @@ def _face(gap=True, teeth=False):
     triangles = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
     across, _, up = points[triangles].mean(axis=1).T
     share = across / HALF
-    inside = np.abs(up - RISE * share**2) < OPEN / 2 * (1 - share**2)
+    inside = np.abs(up - RISE * share**2) < wide / 2 * (1 - share**2)
     if not gap:
         return Surface(points, triangles)
     if not teeth:
@@ -62,6 +65,13 @@ def test_corners_are_the_same_on_a_turned_small_scan():
     straight, found = mouth_outline(face, _guess(), FORWARD), mouth_outline(small, guess, turn @ FORWARD, scale)
     for name, place in straight.corners.items():
         assert found.corners[name] == pytest.approx(scale * turn @ place, abs=1.5)  # a column more or less
+
+
+@pytest.mark.parametrize(("wide", "ajar"), [(0.0, False), (7.0, True), (OPEN, False)])
+def test_lips_are_ajar_when_a_little_apart_and_what_is_wide_is_left_to_the_outline(wide, ajar):
+    space = SimpleNamespace(landmarks=lambda points: _guess())
+    free = SimpleNamespace(points=None, pose=Pose(1.0, np.eye(3), np.zeros(3), 0.0))
+    assert lips_ajar(space, free, _face(gap=wide > 0, wide=wide)) == ajar
 
 
 def test_closed_lips_have_no_outline():

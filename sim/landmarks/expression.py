@@ -24,9 +24,9 @@ HOLED_SHUT = 0.45  # the same of eyes that the skin says are shut: lashes have h
 #: mm on a head of the reference's size between the edges of lips that are parted: noise parts closed lips by 2.9, a tube
 #: between them by 6, a smile with teeth by 12.
 APART = 4.0
-NO_WORSE = (
-    1.05  # how far from the scan lips that are parted may lie, against closed ones: two fits differ as much by chance
-)
+FAR_APART = 12.0  # mm: what is ajar is less
+#: How far from the scan lips that are parted may lie, against closed ones: two fits differ as much by chance.
+NO_WORSE = 1.05
 FEW = 25  # percent of them at which lips that are parted may seem closed: noise looks like edges in places only
 
 
@@ -39,7 +39,7 @@ def fit_expression(space: ShapeSpace, target: Surface, fit: ShapeFit):
     if told is not None:
         work = fit_shape(space, target, free.pose, CHANGE, free.coefficients, 1, Expression(True), told)
         free = yield from _third(work, 1)
-    gap = told is not None or lips_parted(space, free, target)
+    gap = told is not None or lips_ajar(space, free, target)
     mouth = about_mouth(space)
     parted = gap and cost(space, free, mouth) < NO_WORSE * cost(space, fit, mouth)
     fit, told = (free, told) if parted else (fit, None)
@@ -84,16 +84,17 @@ def _third(work, before):
         yield (before + done) / 3
 
 
-def lips_parted(space: ShapeSpace, free: ShapeFit, target: Surface) -> bool:
-    """Whether the scan shows an open mouth: between the lips of a fit that was ``free`` to part them it has two edges.
+def lips_ajar(space: ShapeSpace, free: ShapeFit, target: Surface) -> bool:
+    """Whether the lips are a little apart: between those of a fit that was ``free`` to part them the scan has two edges.
 
     Where closed lips were taken for parted ones, the scan's surface runs from one to the other without a step, but for
-    noise here and there.
+    noise here and there. Of lips far apart the `mouth_outline` tells; edges as far from each other without one are the
+    crease between closed lips and a hole under the lower one.
     """
     forward = -free.pose.turn[:, 1]
     edges = lip_edges(target, space.landmarks(free.points), forward, LOOKED)
     apart = np.nan_to_num(np.linalg.norm(edges[:, 0] - edges[:, 1], axis=1))
-    return bool(np.percentile(apart, FEW) > APART * free.pose.scale)
+    return bool(np.percentile(apart, FEW) > APART * free.pose.scale and np.median(apart) < FAR_APART * free.pose.scale)
 
 
 def holes_in_eyes(marks, matrix, target: Surface) -> float:
