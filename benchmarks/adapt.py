@@ -13,8 +13,8 @@ nearest to an open side of it, or more than `REACH` mm away, have no data and ar
 Peers can also be given the template subdivided once, as fine as what we deliver: a row more for information, at the same
 setting, with the seconds that takes, once. Where truth is known, ``truth`` is the mean distance from the template's vertices,
 the same for all methods, to the point of the subject that each should have found. Times are from scan and landmarks in
-memory to the fitted skin, elapsed and of CPU, each the less of two runs, of ours and of the peers alike; they compare
-within a run only. Prints tables and, on the last line, the same as JSON.
+memory to the fitted skin, elapsed and of CPU, each the least of `AGAIN` + 1 runs, of ours and of the peers alike; they
+compare within a run only. Prints tables and, on the last line, the same as JSON.
 """
 
 import argparse
