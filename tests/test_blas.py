@@ -70,3 +70,17 @@ def test_without_threadpoolctl_work_runs_as_it_is(monkeypatch):
         return 7
 
     assert finish(blas.on_one_thread(work())) == 7
+
+
+def test_a_skin_is_fitted_on_one_thread(monkeypatch):
+    from headshop.sim.adapt import skin_fit
+
+    seen = []
+
+    def fitting(*_):
+        seen.append(counts())
+        yield Progress(0.5, "Half")
+
+    monkeypatch.setattr(skin_fit, "_fitting", fitting)
+    finish(skin_fit.fit_skin(None, None, {}))
+    assert seen == [{1}]

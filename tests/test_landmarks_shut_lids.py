@@ -4,14 +4,20 @@
 import numpy as np
 import pytest
 
+from headshop.sim.adapt import build
 from headshop.sim.adapt.closest import Surface
 from headshop.sim.adapt.shut_eyes import with_shut_eyes
 from headshop.sim.landmarks.shut_lids import with_shut_lids
+from headshop.sim.mesh import Mesh
 from headshop.sim.mesh_subdivision import drawn
 from headshop.sim.progress import finish
 
 TWELVE = ("n", "prn", "sn", "en_l", "en_r", "ex_l", "ex_r", "ch_l", "ch_r", "gn", "t_l", "t_r")
 LIDS = ("ps_l", "pi_l", "ps_r", "pi_r")
+
+
+class SeenError(Exception):
+    """What was to be seen was seen."""
 
 
 @pytest.fixture(scope="module")
@@ -50,3 +56,19 @@ def test_where_no_face_lies_nothing_is_told(reference, scans):
     marks, target = scans["l", "r"]
     away = {name: marks[name] + [0, 4000, 0] for name in TWELVE}
     assert finish(with_shut_lids(reference, target, away)) == away
+
+
+def test_a_head_is_built_with_the_lids_that_were_told(reference, scans, monkeypatch):
+    marks, target = scans["l", "r"]
+    fitted_to = []
+
+    def fit_skin(_, __, given):
+        fitted_to.append(given)
+        raise SeenError
+        yield
+
+    monkeypatch.setattr(build, "fit_skin", fit_skin)
+    scan = Mesh.from_triangles(target.vertices, target.triangles)
+    with pytest.raises(SeenError):
+        finish(build.build_head(reference, scan, {name: marks[name] for name in TWELVE}))
+    assert set(fitted_to[0]) == {*TWELVE, *LIDS}
