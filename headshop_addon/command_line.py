@@ -16,6 +16,7 @@ from ..sim.errors import InputError
 
 INTERRUPTED = 130
 RELAX = ("auto", "always", "never")
+LEAVE_OUT = ("auto", "never")
 SETS = ("muscles", "facs", "arkit", "expressions", "rig")
 
 
@@ -59,6 +60,8 @@ def parser() -> argparse.ArgumentParser:
     build.add_argument("--name", help="what to call the head (default: the scan's name)")
     relax = "make the face neutral: auto (where the lips are parted; the default), always or never"
     build.add_argument("--relax", choices=RELAX, default="auto", metavar="WHEN", help=relax)
+    leave = "leave out what is no skin: auto (flat ends, what the lips hold; the default) or never"
+    build.add_argument("--leave-out", choices=LEAVE_OUT, default="auto", metavar="WHEN", help=leave)
     build.add_argument("-o", "--output", required=True, metavar="HEAD.blend")
 
     landmarks = command("landmarks", "Find the landmarks of a scan.", reading)

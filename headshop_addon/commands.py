@@ -38,7 +38,7 @@ def build(options) -> None:
         from . import pipeline
 
         name = options.name or Path(options.scan).stem
-        wanted = {"detail": options.detail, "relax": options.relax}
+        wanted = {"detail": options.detail, "relax": options.relax, "leave_out": options.leave_out}
         if landmarks is None:
             work = pipeline.build_alone(options.scan, name, options.units, options.up, **wanted)
         else:

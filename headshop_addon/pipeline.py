@@ -113,11 +113,13 @@ def build(
     scene: bpy.types.Scene | None = None,
     detail: int = SIZE,
     relax: str = "auto",
+    leave_out: str = "auto",
 ) -> Work:
     """Fit the reference head to ``scan`` and put it into the scene; returns (skin object, report).
 
     ``landmarks`` are in the scan's place (mm); ``detail`` is the side of the detail maps in pixels, 0 for none.
     ``relax`` is one of `sim.relax.choice.CHOICES`; a face that is relaxed keeps itself as scanned in a shape key.
+    ``leave_out`` is one of `sim.adapt.scan_surface.CHOICES`.
     Closing the generator leaves the scene as it was.
 
     Raises
@@ -128,7 +130,7 @@ def build(
     with timed(seconds, "fit"):
         yield Progress(0.0, "Reading the reference head")
         reference = load_head()
-        result = yield from portion(build_head(reference, scan.mesh, landmarks, detail, relax), 0.02, 0.9)
+        result = yield from portion(build_head(reference, scan.mesh, landmarks, detail, relax, leave_out), 0.02, 0.9)
     yield Progress(0.9, "Placing the head")
     report = {
         "scan": scan.report,

@@ -52,6 +52,12 @@ RELAX = (
     ("NEVER", "Never", "Keep the face as scanned"),
 )
 
+#: What of a scan is left out when a head is built.
+LEAVE_OUT = (
+    ("AUTO", "What Is No Skin", "Leave out flat ends of the scan and what the lips hold, such as a breathing tube"),
+    ("NEVER", "Nothing", "Take all of the scan for skin"),
+)
+
 
 def _on_detail(group, _context):
     detail_images.show(group.id_data, group.detail)
@@ -207,6 +213,11 @@ class HEADSHOP_PG_scene(bpy.types.PropertyGroup):
         name="Relax",
         description="When to make the scanned face neutral; the face as scanned is kept as the shape key Scan",
         items=RELAX,
+    )
+    leave_out: EnumProperty(
+        name="Leave Out",
+        description="What of the scan is not to be fitted; the skin is invented there",
+        items=LEAVE_OUT,
     )
     show_names: BoolProperty(name="Names", description="Write each placed landmark's name beside it", default=True)
 

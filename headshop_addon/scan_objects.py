@@ -167,6 +167,7 @@ def build(context, scan: bpy.types.Object, name: str = "") -> Work:
         scan,
         context.scene,
         relax=context.scene.headshop.relax.lower(),
+        leave_out=context.scene.headshop.leave_out.lower(),
     )
     skin.matrix_world = scan.matrix_world
     scan.hide_viewport = True

@@ -21,6 +21,7 @@ class HEADSHOP_PT_build(SidebarPanel, bpy.types.Panel):
         if progress(layout, "build"):
             return
         layout.prop(context.scene.headshop, "relax")
+        layout.prop(context.scene.headshop, "leave_out")
         row = layout.row()
         row.scale_y = 1.4
         row.operator("headshop.build_head", icon="USER")

@@ -7,7 +7,7 @@ import pytest
 from headshop.sim.adapt import build
 from headshop.sim.adapt.closest import Surface
 from headshop.sim.adapt.shut_eyes import with_shut_eyes
-from headshop.sim.landmarks.shut_lids import with_shut_lids
+from headshop.sim.landmarks.first_look import first_look
 from headshop.sim.mesh import Mesh
 from headshop.sim.mesh_subdivision import drawn
 from headshop.sim.progress import finish
@@ -18,6 +18,11 @@ LIDS = ("ps_l", "pi_l", "ps_r", "pi_r")
 
 class SeenError(Exception):
     """What was to be seen was seen."""
+
+
+def told_of(reference, target, given):
+    """The landmarks after a first look."""
+    return finish(first_look(reference, target, given)).landmarks
 
 
 @pytest.fixture(scope="module")
@@ -34,7 +39,7 @@ def scans(reference):
 
 def test_lids_that_meet_are_told_and_where(reference, scans):
     marks, target = scans["l", "r"]
-    told = finish(with_shut_lids(reference, target, {name: marks[name] for name in TWELVE}))
+    told = told_of(reference, target, {name: marks[name] for name in TWELVE})
     assert set(told) == {*TWELVE, *LIDS}
     for side in "lr":
         np.testing.assert_array_equal(told[f"ps_{side}"], told[f"pi_{side}"])
@@ -44,25 +49,25 @@ def test_lids_that_meet_are_told_and_where(reference, scans):
 def test_open_eyes_and_lids_that_are_given_stay_as_they_are(reference, scans):
     marks, target = scans[()]
     given = {name: marks[name] for name in TWELVE}
-    assert finish(with_shut_lids(reference, target, given)) == given
+    assert told_of(reference, target, given) == given
     marks, target = scans["l", "r"]
     every = {name: marks[name] for name in (*TWELVE, *LIDS)}
-    assert finish(with_shut_lids(reference, target, every)) == every
+    assert told_of(reference, target, every) == every
     one = {name: marks[name] for name in (*TWELVE, "ps_l")}
-    assert set(finish(with_shut_lids(reference, target, one))) == {*one, "ps_r", "pi_r"}
+    assert set(told_of(reference, target, one)) == {*one, "ps_r", "pi_r"}
 
 
 def test_where_no_face_lies_nothing_is_told(reference, scans):
     marks, target = scans["l", "r"]
     away = {name: marks[name] + [0, 4000, 0] for name in TWELVE}
-    assert finish(with_shut_lids(reference, target, away)) == away
+    assert told_of(reference, target, away) == away
 
 
 def test_a_head_is_built_with_the_lids_that_were_told(reference, scans, monkeypatch):
     marks, target = scans["l", "r"]
     fitted_to = []
 
-    def fit_skin(_, __, given):
+    def fit_skin(_, __, given, ___):
         fitted_to.append(given)
         raise SeenError
         yield

@@ -4,10 +4,12 @@
 import numpy as np
 import pytest
 
+from headshop.sim.adapt.build import build_head
 from headshop.sim.adapt.closest import Surface
 from headshop.sim.adapt.scan_surface import cuts_of, scan_surface
 from headshop.sim.adapt.skin_fit import fit_skin
 from headshop.sim.anatomy.landmark_names import SKIN
+from headshop.sim.errors import InputError
 from headshop.sim.landmarks.confidence import judge
 from headshop.sim.landmarks.pose_search import Pose
 from headshop.sim.landmarks.shape_fit import fit_shape
@@ -100,3 +102,19 @@ def test_landmarks_on_a_flat_end_are_in_mid_air(reference, cut_off, height):
     positions = {n: marks[n] for n in ("prn", "gn", "en_l", "t_r")} | {"v": [*marks["v"][:2], height]}
     _, mid_air, missing = judge(space, fit, target, {n: np.asarray(p, float) for n, p in positions.items()})
     assert "v" in mid_air + missing and "prn" not in mid_air + missing
+
+
+def test_who_wants_to_keep_a_flat_end_does(reference, cut_off, height):
+    marks = reference.landmark_positions()
+    given = {n: marks[n] for n in SKIN if n in marks and marks[n][2] < height - 10}
+    scan = Mesh.from_triangles(*cut_off)
+    found = {}
+    for choice in ("auto", "never"):
+        built = finish(build_head(reference, scan, given, detail=0, leave_out=choice))
+        on_top = built.head.skin.vertices[:, 2] > height - 2
+        found[choice] = np.isfinite(built.attributes["distance_mm"][on_top]).sum()
+        assert bool(built.fit["left_out_mm2"]["flat_ends"]) == (choice == "auto")
+        assert ("left out: a flat end;" in built.fit["sentence"]) == (choice == "auto")
+    assert found["auto"] == 0 < found["never"]
+    with pytest.raises(InputError, match="auto or never"):
+        finish(build_head(reference, scan, given, leave_out="sometimes"))

@@ -21,7 +21,7 @@ from .follow import follow
 from .gate import check_against_scan, check_arrangement, check_likeness, check_on_surface
 from .landmarks import require_usable
 from .rest import BONES, rest_of
-from .scan_surface import scan_surface
+from .scan_surface import near_head, require_leaving, without_cuts
 from .skin_fit import SkinFit, fit_skin
 from .skin_groups import group
 from .vestibules import vestibules
@@ -58,32 +58,41 @@ class BuildResult:
 
 
 def build_head(
-    reference: Head, scan: Mesh, landmarks: dict[str, np.ndarray], detail: int = SIZE, relax: str = "auto"
+    reference: Head,
+    scan: Mesh,
+    landmarks: dict[str, np.ndarray],
+    detail: int = SIZE,
+    relax: str = "auto",
+    leave_out: str = "auto",
 ) -> Work:
     """Work returning the `BuildResult` for a scan (mm, any place) with four or more ``landmarks`` (name -> mm).
 
     detail : texels along a side of the detail maps; 0 for none
     relax : ``auto`` makes a face neutral whose lips are parted (`sim.relax`), ``always`` any, ``never`` none. The figures
         in ``fit`` are those of the face as scanned.
+    leave_out : ``auto`` leaves out of the scan what is no skin, flat ends and what the lips hold, ``never`` nothing
 
     Raises
     ------
     InputError : the landmarks are too few, do not form a face, or do not belong to this scan; or no good fit was found.
     """
-    from ..landmarks.shut_lids import with_shut_lids
+    from ..landmarks.first_look import first_look
 
     given = {n: np.asarray(p, dtype=float) for n, p in landmarks.items() if n in SKIN}
     require_usable(given, "The landmark set")
     require_choice(relax)
+    require_leaving(leave_out)
     yield Progress(0.0, "Looking at the scan")
-    target = scan_surface(reference, scan, given)
+    whole = near_head(reference, scan, given)
+    target = whole if leave_out == "never" else without_cuts(whole)
     yield Progress(0.05, "Judging the landmarks")
     check_against_scan(given, target)
     check_arrangement(reference.landmark_positions(), given)
     yield Progress(0.08, "Judging the landmarks")
     check_on_surface(given, target)
-    told = yield from portion(with_shut_lids(reference, target, given), 0.1, 0.3)
-    fit = yield from portion(fit_skin(reference, target, told), 0.3, 0.6)
+    look = yield from portion(first_look(reference, target, given, leave_out == "never"), 0.1, 0.3)
+    fit = yield from portion(fit_skin(reference, look.filled, look.landmarks, look.parted), 0.3, 0.6)
+    fit = look.seen_only(fit)
     yield Progress(0.6, "Judging the fit")
     refuse_poor(fit_report(reference, fit, given))
     check_likeness(fit.reference, fit.cage, fit.fitted.fitted)
@@ -97,6 +106,7 @@ def build_head(
     scanned = head.skin.vertices + (fit.cage - skin)
     report = fit_report(reference, fit, given, scanned)
     report["invented"] = invented(fitted_shares(head, fit.fitted.fitted))
+    report["left_out_mm2"] = {"flat_ends": float(whole.area.sum() - target.area.sum()), "held_by_lips": look.held_mm2}
     report["sentence"] = fit_sentence(report, report["invented"])
     if neutral is not None and relax == "never":
         head, neutral = kept_open(fit.lips_closed, head, scanned, neutral.jaw), None

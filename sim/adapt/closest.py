@@ -164,6 +164,15 @@ class Surface:
         out.triangles, out.face_normals = self.triangles[:, ::-1], -self.face_normals
         return out
 
+    def without(self, triangles: np.ndarray) -> "Surface":
+        """This surface without some of its ``triangles`` (m,) bool; itself where they are none."""
+        return Surface(self.vertices, self.triangles[~triangles], self._smooth) if triangles.any() else self
+
+    def beside(self, vertices, triangles) -> "Surface":
+        """This surface and another one, ``vertices`` (k, 3) mm and ``triangles`` (t, 3), as one."""
+        both = np.concatenate([self.triangles, triangles + len(self.vertices)])
+        return Surface(np.concatenate([self.vertices, vertices]), both, self._smooth)
+
     def coarser(self, most: int = ENOUGH) -> "Surface":
         """This surface with about ``most`` triangles, by merging vertices that are closest; itself where it has no more.
 

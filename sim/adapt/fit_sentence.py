@@ -17,6 +17,8 @@ REGIONS = {
     "scalp": ("scalp",),
     "neck": ("neck",),
 }
+#: Key of what was left out of the scan -> what is said of it.
+LEFT_OUT = {"flat_ends": "a flat end", "held_by_lips": "what the lips hold"}
 SIDED = ("eyelids", "cheek", "ear")
 FITTED = 0.3  # a vertex counts as fitted from here on
 MOST, ALL = 0.4, 0.1  # share of a region that was fitted, below which it counts as invented for the most part, wholly
@@ -75,10 +77,15 @@ def invented(shares: dict[str, float]) -> list[str]:
 def fit_sentence(fit: dict, missing: list[str]) -> str:
     """``Fitted 83 % of the face to 0.14 mm on average (95 % within 0.42 mm); invented: left ear, neck.``
 
+    Where something was: ``...; left out: a flat end; invented: ...``
+
     fit : the ``fit`` block of the report; missing : what `invented` returns
     """
     said = (
         f"Fitted {100 * fit['coverage']:.0f} % of the face to {fit['mean_mm']:.2f} mm on average "
         f"(95 % within {fit['p95_mm']:.2f} mm)"
     )
+    out = [words for key, words in LEFT_OUT.items() if fit.get("left_out_mm2", {}).get(key)]
+    if out:
+        said = f"{said}; left out: {', '.join(out)}"
     return f"{said}; invented: {', '.join(missing)}." if missing else f"{said}; nothing was invented."

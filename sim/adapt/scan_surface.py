@@ -4,6 +4,7 @@
 import numpy as np
 
 from ..anatomy.head import Head
+from ..errors import InputError
 from ..mesh import Mesh
 from ..scan.flat_cuts import beyond, flat_cuts
 from .closest import Surface
@@ -12,18 +13,30 @@ from .thin_plate_spline import similarity
 NORMALS = 2.0  # mm over which the scan's normals are averaged
 MOST = 600_000  # triangles of a scan that are all looked at: edges of about 0.7 mm on a head
 ROOM = 0.35  # of the head's size that is kept around it
+#: ``auto`` leaves out what is no skin.
+CHOICES = ("auto", "never")
+
+
+def require_leaving(choice: str) -> None:
+    """Raise `InputError` for a choice that is none of `CHOICES`."""
+    if choice not in CHOICES:
+        raise InputError(f"To leave out {choice!r} is unknown: choose {' or '.join(CHOICES)}.")
 
 
 def scan_surface(reference: Head, scan: Mesh, given: dict[str, np.ndarray], most: int = MOST) -> Surface:
-    """The surface of ``scan`` (mm, any place) that the reference is fitted to.
+    """The surface of ``scan`` (mm, any place) that the reference is fitted to: `near_head` `without_cuts`."""
+    return without_cuts(near_head(reference, scan, given, most))
+
+
+def near_head(reference: Head, scan: Mesh, given: dict[str, np.ndarray], most: int = MOST) -> Surface:
+    """The surface of ``scan`` (mm, any place) that is looked at.
 
     given : name -> (3,) mm, landmarks that tell where the head is. A scan of more than ``most`` triangles is cut to the
-    head's neighbourhood, unless the landmarks lie elsewhere, and thinned (`Surface.coarser`). Flat ends are left out
-    (`flat_cuts`).
+    head's neighbourhood, unless the landmarks lie elsewhere, and thinned (`Surface.coarser`).
     """
     triangles = scan.triangles
     if len(triangles) <= most:
-        return without_cuts(Surface(scan.vertices, triangles, NORMALS))
+        return Surface(scan.vertices, triangles, NORMALS)
     rest = reference.landmark_positions()
     names = [name for name in given if name in rest]
     matrix, shift = similarity([rest[name] for name in names], [given[name] for name in names])
@@ -32,14 +45,12 @@ def scan_surface(reference: Head, scan: Mesh, given: dict[str, np.ndarray], most
     near = ((scan.vertices > head.min(axis=0) - margin) & (scan.vertices < head.max(axis=0) + margin)).all(axis=1)
     kept = near[triangles].all(axis=1)
     some = triangles[kept] if kept.sum() > most / 10 else triangles
-    return without_cuts(Surface(scan.vertices, some, NORMALS).coarser(most))
+    return Surface(scan.vertices, some, NORMALS).coarser(most)
 
 
 def without_cuts(surface: Surface) -> Surface:
-    """``surface`` without its flat ends: there it stops, and what lies beyond is to be invented."""
-    planes = cuts_of(surface)
-    cut = beyond(planes, surface.vertices)[surface.triangles].any(axis=1)
-    return Surface(surface.vertices, surface.triangles[~cut], NORMALS) if cut.any() else surface
+    """``surface`` without its flat ends (`flat_cuts`): there it stops, and what lies beyond is to be invented."""
+    return surface.without(beyond(cuts_of(surface), surface.vertices)[surface.triangles].any(axis=1))
 
 
 def cuts_of(surface: Surface) -> np.ndarray:

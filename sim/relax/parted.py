@@ -27,6 +27,7 @@ STILL = (
 )
 APART = 6.0  # mm between the lips on the scan, and by what all is explained with, from which on they count as parted
 TOLD = 3.5
+AJAR = 4.0  # mm between the lips on the scan that are known to be apart otherwise
 CARE = 0.7  # a landmark's deviation, by what is usual for it
 EDGE = 1.0  # mm, the same of a lip's edge
 ASIDE = 0.75  # edges nearer to the corners than this share of the way are not looked for
@@ -42,8 +43,11 @@ class PartedLips:
     edges: np.ndarray
 
 
-def parted_lips(reference: Head, target: Surface, given) -> PartedLips | None:
-    """How the mouth of a scan ``target`` with the landmarks ``given`` (name -> mm) is open; None: its lips are closed."""
+def parted_lips(reference: Head, target: Surface, given, ajar: bool = False) -> PartedLips | None:
+    """How the mouth of a scan ``target`` with the landmarks ``given`` (name -> mm) is open; None: its lips are closed.
+
+    ajar : they are known to be apart, if only a little
+    """
     names = [name for name in given if name in reference.landmarks.names and name != "sto"]
     if len(names) < 6 or not answers(reference):
         return None
@@ -52,7 +56,7 @@ def parted_lips(reference: Head, target: Surface, given) -> PartedLips | None:
     matrix, _ = similarity(marks, goal)
     forward = -matrix[:, 1] / np.linalg.norm(matrix[:, 1])
     first = np.array([-0.25, 0.0, 0.25])
-    if opening(lip_edges(target, given, forward, first), first) < APART:
+    if opening(lip_edges(target, given, forward, first), first) < (AJAR if ajar else APART):
         return None
     looked = np.linspace(-ASIDE, ASIDE, LINES)
     edges = lip_edges(target, given, forward, looked)

@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A first look at a scan with the landmarks given: a plausible head laid on it tells what they do not.
+
+Which eyes are shut, and what hangs out of the mouth and is no skin.
+"""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ..adapt.closest import Surface
+from ..adapt.skin_fit import SkinFit
+from ..adapt.thin_plate_spline import similarity
+from ..anatomy.head import Head
+from ..progress import Work
+from .expression import fit_expression
+from .held_by_lips import held_by_lips
+from .hidden_skin import hidden_skin, with_hidden_skin
+from .placed_face import run
+from .pose_search import Pose
+from .shape_fit import NoFaceError, fit_shape
+from .shape_space import shape_space
+from .shut_lids import shut_lids
+
+LOOKING = "Looking at lids and lips"
+FEWEST = 4  # landmarks that tell where the head is
+
+
+@dataclass(frozen=True, eq=False)
+class FirstLook:
+    """landmarks : name -> (3,) mm, those given and those of eyes that are shut; parted : the lips are, if only a little;
+    target : the scan without what the lips hold; held_mm2 : how much of it that is; filled : with skin behind it, as it
+    probably is; hidden (k,) : vertices of the reference's skin that make that up."""
+
+    landmarks: dict[str, np.ndarray]
+    target: Surface
+    filled: Surface
+    parted: bool = False
+    held_mm2: float = 0.0
+    hidden: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
+
+    def seen_only(self, fit: SkinFit) -> SkinFit:
+        """A ``fit`` to the ``filled`` scan, as one to what the scan shows."""
+        if fit.target is not self.filled or len(self.hidden) == 0:
+            return fit
+        fitted, distance = fit.fitted.fitted.copy(), fit.fitted.distance.copy()
+        fitted[self.hidden], distance[self.hidden] = 0, np.nan
+        return replace(fit, target=self.target, fitted=replace(fit.fitted, fitted=fitted, distance=distance))
+
+
+def first_look(reference: Head, target: Surface, given: dict[str, np.ndarray], keep_held: bool = False) -> Work:
+    """Work returning the `FirstLook` at the scan ``target`` with the landmarks ``given`` (name -> (3,) mm).
+
+    keep_held : what the lips hold is to be taken for skin
+    """
+    rest = reference.landmark_positions()
+    names = [name for name in given if name in rest]
+    if len(names) < FEWEST:
+        return FirstLook(given, target, target)
+    space, coarse = shape_space(reference), target.coarser()
+    matrix, shift = similarity([rest[name] for name in names], [given[name] for name in names])
+    scale = np.cbrt(np.linalg.det(matrix))
+    try:
+        fit = yield from run(fit_shape(space, coarse, Pose(scale, matrix / scale, shift, 0.0)), 0.0, 0.6, LOOKING)
+        fit, shown = yield from run(fit_expression(space, coarse, fit), 0.6, 1.0, LOOKING)
+    except NoFaceError:
+        return FirstLook(given, target, target)
+    landmarks = given | shut_lids(space, fit, shown, coarse, given)
+    if keep_held:
+        return FirstLook(landmarks, target, target, shown.parted)
+    held = held_by_lips(space, fit, target)
+    left = target.without(held)
+    hidden = hidden_skin(space, fit, target.vertices[target.triangles[held].ravel()], left)
+    filled = with_hidden_skin(space, fit, hidden, left)
+    return FirstLook(landmarks, left, filled, shown.parted, float(target.area[held].sum()), space.vertices[hidden])

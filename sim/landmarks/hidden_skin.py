@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Skin that something hides, where it probably lies: the plausible head laid on the scan, brought to what is seen around it
+and on the other side of the face.
+
+How far the scan stands off that head is taken for a Gaussian process on the reference, the same on both sides of it.
+"""
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+from scipy.spatial import cKDTree
+from scipy.spatial.distance import cdist
+
+from ..adapt.closest import Surface
+from ..mesh import vertex_normals
+from .shape_fit import ShapeFit, pairs
+from .shape_space import ShapeSpace
+
+BEHIND, SEEN = 9.0, 3.0  # mm to which a thing hides skin behind it; from which on skin is not seen
+ABOUT = 30.0  # mm from hidden skin that is looked at
+TRUSTED = 0.3  # of `ShapeFit.trust`
+SPREAD, RANGE, ROUGH = 2.0, 9.0, 0.5  # mm: deviation of the heights, how far they go together, deviation of each
+ALIKE = 0.8  # correlation of left and right
+MIRROR = np.array([-1.0, 1.0, 1.0])
+
+
+def hidden_skin(space: ShapeSpace, fit: ShapeFit, things, left: Surface) -> np.ndarray:
+    """(n,) bool: the points of the skin that lie behind ``things`` (k, 3) mm and that the scan without those, ``left``, does
+    not show."""
+    if len(things) == 0:
+        return np.zeros(len(fit.points), dtype=bool)
+    _, trust, _ = pairs(space, fit.points, left, SEEN * fit.pose.scale)
+    return (trust == 0) & (cKDTree(things).query(fit.points)[0] < BEHIND * fit.pose.scale)
+
+
+def with_hidden_skin(space: ShapeSpace, fit: ShapeFit, hidden, left: Surface) -> Surface:
+    """The scan ``left`` with the ``hidden`` (n,) bool skin in its place, where that probably is."""
+    patch = space.triangles[hidden[space.triangles].any(axis=1)]
+    if len(patch) == 0:
+        return left
+    used, corners = np.unique(patch, return_inverse=True)
+    normals = vertex_normals(fit.points, space.triangles)
+    place, trust, _ = pairs(space, fit.points, left, 2 * SEEN * fit.pose.scale)
+    near = cKDTree(space.points[used]).query(space.points * MIRROR)[0] < ABOUT
+    near |= cKDTree(space.points[used]).query(space.points)[0] < ABOUT
+    known = np.flatnonzero(near & (trust > TRUSTED))
+    off = np.einsum("ij,ij->i", place[known] - fit.points[known], normals[known])
+    system = _alike(space.points[known], space.points[known])
+    system[np.diag_indices_from(system)] += (ROUGH / SPREAD) ** 2
+    out = _alike(space.points[used], space.points[known]) @ cho_solve(cho_factor(system), off)
+    points = fit.points[used] + out[:, None] * normals[used]
+    return left.beside(points, corners.reshape(-1, 3))
+
+
+def _alike(a, b):
+    """(j, k) covariance between points (j, 3) and (k, 3) mm, as a share of the variance."""
+
+    def near(c):
+        return np.exp(-cdist(a, c, "sqeuclidean") / (2 * RANGE**2))
+
+    return near(b) + ALIKE * near(b * MIRROR)

@@ -1,0 +1,115 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What somebody holds between the lips is told from the face, and the skin behind it is invented."""
+
+import numpy as np
+import pytest
+
+from headshop.sim.adapt import build
+from headshop.sim.adapt.closest import Surface
+from headshop.sim.anatomy.landmark_names import SKIN
+from headshop.sim.landmarks.first_look import first_look
+from headshop.sim.mesh import Mesh
+from headshop.sim.mesh_subdivision import smoother
+from headshop.sim.progress import finish
+
+RADIUS, LONG = 4.0, 38.0  # mm of the tube
+ASIDE = 9.0  # mm from the middle of the mouth to the tube, to the subject's right
+
+
+@pytest.fixture(scope="module")
+def face(reference):
+    """The outside of the reference as it is drawn: (vertices, triangles)."""
+    rows, quads = smoother(reference.skin.faces, len(reference.skin.vertices))
+    vertices = rows @ reference.skin.vertices
+    inner = rows @ reference.groups["inner"] > 0.5
+    triangles = Mesh(vertices, quads).triangles
+    return vertices, triangles[~inner[triangles].any(axis=1)]
+
+
+@pytest.fixture(scope="module")
+def marks(reference):
+    """Landmarks of the reference, those of the skin."""
+    return {n: p for n, p in reference.landmark_positions().items() if n in SKIN}
+
+
+@pytest.fixture(scope="module")
+def tube(marks):
+    """A tube that comes out of the mouth and hangs down before the lip and chin: (vertices, triangles)."""
+    around, along = np.linspace(0, 2 * np.pi, 24, endpoint=False), np.linspace(0, LONG, 39)
+    start = marks["sto"] + [-ASIDE, -9.0, 2.0]
+    ring = RADIUS * np.stack([np.cos(around), np.sin(around), np.zeros_like(around)], axis=1)
+    vertices = (start + ring + np.stack([0 * along, 0 * along, -along], axis=1)[:, None]).reshape(-1, 3)
+    k = np.arange(len(vertices)).reshape(len(along), -1)
+    turn = np.roll(k, -1, axis=1)
+    quads = np.stack([k[:-1], k[1:], turn[1:], turn[:-1]], axis=-1).reshape(-1, 4)
+    triangles = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+    caps = [np.stack([np.full(22, k[row, 0]), k[row, 1:-1], k[row, 2:]], axis=1)[:, order] for row, order in CAPS]
+    return vertices, np.concatenate([triangles, *caps])
+
+
+CAPS = ((0, [0, 1, 2]), (-1, [0, 2, 1]))
+
+
+@pytest.fixture(scope="module")
+def scan(face, tube, marks):
+    """Both as one scan, without the skin behind the tube, which nothing shows."""
+    vertices, triangles = face
+    low, high = tube[0].min(axis=0) - 1.0, tube[0].max(axis=0) + 1.0
+    across = [0, 2]
+    behind = ((vertices[:, across] > low[across]) & (vertices[:, across] < high[across])).all(axis=1)
+    behind &= vertices[:, 1] < marks["ch_r"][1]
+    triangles = triangles[~behind[triangles].all(axis=1)]
+    vertices = np.concatenate([vertices, tube[0]])
+    return Surface(vertices, np.concatenate([triangles, tube[1] + len(face[0])]), smooth=2.0)
+
+
+def in_tube(points, tube):
+    """(k,) bool: which of ``points`` lie on the tube."""
+    return Surface(*tube).closest(points).distance < 1e-6
+
+
+def test_a_tube_is_left_out_and_the_face_is_not(reference, marks, scan, tube):
+    look = finish(first_look(reference, scan, marks))
+    kept = in_tube(look.target.corners.mean(axis=1), tube)
+    area = Surface(*tube).area.sum()
+    assert look.target.area[kept].sum() < 0.2 * area  # the back of it, which lies on the lip
+    skin = ~in_tube(scan.corners.mean(axis=1), tube)
+    lost = scan.area[skin].sum() - look.target.area[~kept].sum()
+    assert lost < 150.0  # mm² of skin just beside it
+    assert look.held_mm2 == pytest.approx(scan.area.sum() - look.target.area.sum())
+
+
+def test_skin_behind_it_is_where_the_other_side_says(reference, marks, scan, face):
+    look = finish(first_look(reference, scan, marks))
+    patch = look.filled.triangles[len(look.target.triangles) :]
+    assert len(patch) > 0 and len(look.hidden) > 0
+    places = look.filled.vertices[np.unique(patch)]
+    assert Surface(*face).closest(places).distance.max() < 1.0
+    assert places[:, 0].mean() < -3.0  # to the subject's right, where the tube hangs
+
+
+def test_a_face_with_nothing_in_its_mouth_is_kept_whole(reference, marks, face):
+    whole = Surface(*face, smooth=2.0)
+    look = finish(first_look(reference, whole, marks))
+    assert look.target is whole and look.filled is whole and look.held_mm2 == 0
+
+
+def test_who_wants_to_keep_it_does(reference, marks, scan):
+    look = finish(first_look(reference, scan, marks, keep_held=True))
+    assert look.target is scan and look.filled is scan and look.held_mm2 == 0
+
+
+def test_the_head_has_no_tube_and_says_so(reference, marks, scan, face, tube):
+    mesh = Mesh.from_triangles(scan.vertices, scan.triangles)
+    built = finish(build.build_head(reference, mesh, marks, detail=0))
+    truth = Surface(*face)
+    rows, _ = smoother(reference.skin.faces, len(reference.skin.vertices))
+    outside = built.head.groups["face"] > 0.5
+    outside &= built.head.groups["inner"] < 0.5
+    drawn = (rows @ built.head.skin.vertices)[: len(outside)][outside]
+    assert truth.closest(drawn).distance.max() < 2.0
+    assert built.fit["left_out_mm2"]["held_by_lips"] > 500 and built.fit["left_out_mm2"]["flat_ends"] == 0
+    assert "left out: what the lips hold;" in built.fit["sentence"]
+    behind = np.linalg.norm(built.head.skin.vertices - (marks["sto"] + [-ASIDE, 0, -12]), axis=1) < 3
+    assert behind.any() and built.attributes["fitted"][behind & outside].max() == 0
+    assert np.isnan(built.attributes["distance_mm"][behind & outside]).all()
