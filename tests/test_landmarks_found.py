@@ -94,3 +94,18 @@ def test_open_eyes_have_holes_and_shut_ones_none(reference):
         target = Surface(drawn(head.skin.faces, head.skin.vertices), head.skin.triangles[seen])
         found = holes_in_eyes(head.landmark_positions(), np.eye(3), target)
         assert (found > HOLED) == holed
+
+
+def test_eyes_with_holes_are_open_though_their_lids_have_lost_their_edges(reference):
+    """A scanner that loses the eyes loses the edges of the upper lids with them; the lids are not shut for that."""
+    skin = reference.skin
+    vertices, marks = drawn(skin.faces, skin.vertices), reference.landmark_positions()
+    seen = (reference.groups["inner"] < 0.5)[skin.triangles].all(axis=1)
+    middle = vertices[skin.triangles].mean(axis=1)
+    for side in "lr":
+        eye = (marks[f"en_{side}"] + marks[f"ex_{side}"]) / 2 + [0, 0, 5.0]
+        seen &= (((middle - eye)[:, [0, 2]] / [18.0, 9.0]) ** 2).sum(axis=1) > 1
+    found = finish(find_landmarks(Mesh.from_triangles(vertices, skin.triangles[seen]), reference, (1.0,)))
+    for side in "lr":
+        height = (marks[f"ps_{side}"] - marks[f"pi_{side}"])[2]
+        assert (found.positions[f"ps_{side}"] - found.positions[f"pi_{side}"])[2] > 0.7 * height

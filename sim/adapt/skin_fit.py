@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The skin of the reference fitted to a scan: warp, refine, reach the data (Kähler et al. 2002, section 6)."""
 
-from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -80,7 +79,6 @@ def fit_skin(reference: Head, target: Surface, given: dict[str, np.ndarray], aja
 def _fitting(reference: Head, target: Surface, given: dict[str, np.ndarray], ajar: bool) -> Work:
     yield Progress(0.0, "Looking at lids and lips")
     data = target.coarser()
-    ready = prepared(data)
     lips_closed, closed = as_scanned(reference, given)
     whole, given, lips = with_lips_as_scanned(lips_closed, target, given, ajar)
     reference = whole.with_vertices({"skin": drawn(whole.skin.faces, whole.skin.vertices)})
@@ -109,7 +107,6 @@ def _fitting(reference: Head, target: Surface, given: dict[str, np.ndarray], aja
     aim = np.concatenate([goal, margin_goal])
     first = ThinPlateSpline.fit(np.concatenate([marks, skin.vertices[margin]]), aim, give)
     moved = first.transform(skin.vertices)
-    ready.result()
     if faces_in(data, moved, outer):
         same = data is target
         target = target.turned()
@@ -186,14 +183,6 @@ def feature_triangles(reference: Head, names) -> np.ndarray:
     place = {name: k for k, name in enumerate(names)}
     order = np.array([place.get(name, -1) for name in reference.landmarks.names], dtype=np.int32)
     return order[reference.feature_mesh]
-
-
-def prepared(data: Surface) -> Future:
-    """The future in which ``data`` can be searched: what that needs is made in a thread of its own."""
-    beside = ThreadPoolExecutor(1)
-    ready = beside.submit(lambda: (data.cover, data.normals, data.piece_area))
-    beside.shutdown(wait=False)
-    return ready
 
 
 def faces_in(data: Surface, skin: np.ndarray, outer: np.ndarray) -> bool:

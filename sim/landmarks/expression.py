@@ -21,6 +21,9 @@ LOOKED = np.linspace(-0.28, 0.28, 9)  # shares of the way from the middle of the
 EYE_LINES, ACROSS, LINE = np.linspace(0.25, 0.75, 11), 9.0, 60
 HOLE, HOLED = 1.2, 0.3
 HOLED_SHUT = 0.45  # the same of eyes that the skin says are shut: lashes have holes as well
+#: Eyes that are open, as their holes tell, and shut farther than this were misread: the holes take the lids' edges with them,
+#: and nothing else holds the lids up.
+DROOPED = 0.15
 #: mm on a head of the reference's size between the edges of lips that are parted: noise parts closed lips by 2.9, a tube
 #: between them by 6, a smile with teeth by 12.
 APART = 4.0
@@ -52,6 +55,9 @@ def fit_expression(space: ShapeSpace, target: Surface, fit: ShapeFit):
     about = eyes(space)
     if holes < HOLED and cost(space, rival, about) < REASON * cost(space, fit, about):
         return rival, shut
+    if holes >= HOLED and max(shut_share(space, fit).values()) > DROOPED:
+        wide = Expression(parted, wide=True)
+        fit = yield from _third(fit_shape(space, target, fit.pose, CHANGE, fit.coefficients, 1, wide, told), 2)
     return fit, Expression(parted)
 
 

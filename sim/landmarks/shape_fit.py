@@ -43,10 +43,12 @@ class NoFaceError(Exception):
 
 @dataclass(frozen=True)
 class Expression:
-    """What lips and lids do: whether the lips are ``parted``, and the sides ("l", "r") of eyes that are ``shut``."""
+    """What lips and lids do: whether the lips are ``parted``, the sides ("l", "r") of eyes that are ``shut``, and whether
+    eyes are ``wide`` open, as the reference's."""
 
     parted: bool = False
     shut: tuple[str, ...] = ()
+    wide: bool = False
 
 
 REST = Expression()
@@ -145,6 +147,8 @@ def fit_shape(
         pull[7:] += prior[7:] * usual
         if not expression.parted:
             system[7:, 7:] += space.seal
+        if expression.wide:
+            system[7:, 7:] += space.wide
         step = np.linalg.solve(system, pull)
         coefficients = step[7:]
         grow = 1 + np.clip(step[6], -0.1, 0.1)
