@@ -16,11 +16,12 @@ from ..mesh import cross_sides, vertex_normals
 from ..mesh_subdivision import drawn, undrawn
 from .closest import Surface
 from .drawn_points import DrawnPoints, drawn_points, own_points
-from .smooth_system import Smoothness, solve_displacement
+from .smooth_system import ROUGHLY, SOLVED, Smoothness, solve_displacement
 from .tracked import Tracked
 
 #: One round each: stiffness of bending, reach in mm, width in mm of what counts as an outlier. The last may be repeated.
 SCHEDULE = (
+    (4.0, 12.0, 4.0),
     (0.6, 9.0, 3.0),
     (0.12, 6.0, 2.0),
     (0.04, 5.0, 1.2),
@@ -153,7 +154,8 @@ def nearer(base, moved, surface: DrawnPoints, tracked: Tracked, anchors: Anchors
     pulls = facing * np.einsum("ij,ij->i", facing, goal)[:, None] + along[:, None] * goal
     sampling = vstack([rows, anchors.sampling]).tocsr()
     pulls *= weight[:, None]
-    moved = solve_displacement(smooth, soft, sampling, weight, facing, along, pulls, moved)
+    left = SOLVED if soft == end else ROUGHLY
+    moved = solve_displacement(smooth, soft, sampling, weight, facing, along, pulls, moved, left)
     worse = folded(surface.rows @ base, surface.rows @ (base + moved), surface.triangles)
     if worse.any():
         at = np.zeros(len(now))

@@ -9,7 +9,8 @@ from ..mesh import edges
 
 FINEST = 4.0  # most by which fine parts of the mesh are stiffened
 STRETCH = 0.002  # weight of first differences, which keeps the mesh from sliding where bending is free
-CLOSE = 1e-5  # energy of what is left, against that of the pulls, at which the system counts as solved
+#: Energy of what is left, against that of the pulls, at which the system counts as solved; as solved enough to go on from.
+SOLVED, ROUGHLY = 1e-5, 1e-4
 FOLDED = 6.0  # factor on the stiffness around a fold
 
 
@@ -92,14 +93,14 @@ def factorised(matrix):
     ).solve
 
 
-def solve_displacement(smoothness: Smoothness, soft, sampling, weight, normals, along, pulls, start):
+def solve_displacement(smoothness: Smoothness, soft, sampling, weight, normals, along, pulls, start, left=SOLVED):
     """The displacement (n, 3) that minimises ``u^T smooth u + sum_s (S u - g)_s^T W_s (S u - g)_s``.
 
     smooth (n, n) : that of ``smoothness`` when it is so ``soft``, the same for x, y, z; sampling S (s, n); W_s = weight
     (normal normal^T + along 1) of weight (s,), normals (s, 3), zero for a point that is pulled alike every way, and along
-    (s,); pulls W g (s, 3), mm; start (n, 3) a first guess. Solved by conjugate gradients, preconditioned with a
-    factorised system whose W are all isotropic: a few steps, and each axis alone in the factor. It is that of an earlier
-    call where ``smoothness`` has one.
+    (s,); pulls W g (s, 3), mm; start (n, 3) a first guess; left : `SOLVED` or `ROUGHLY`. Solved by conjugate
+    gradients, preconditioned with a factorised system whose W are all isotropic: a few steps, and each axis alone in the
+    factor. It is that of an earlier call where ``smoothness`` has one.
     """
     smooth = smoothness.matrix(soft)
     n = sampling.shape[1]
@@ -123,7 +124,7 @@ def solve_displacement(smoothness: Smoothness, soft, sampling, weight, normals, 
     r = right - apply(x)
     z = precondition(r)
     p, rz = z, float(np.vdot(r, z))
-    goal = CLOSE * max(float(np.vdot(right, precondition(right))), 1e-12)
+    goal = left * max(float(np.vdot(right, precondition(right))), 1e-12)
     for _ in range(60):
         if rz <= goal:
             break
