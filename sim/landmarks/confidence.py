@@ -9,7 +9,7 @@ from ..adapt.completion import sigma
 from ..adapt.ears import EAR_MARKS, MOST_MARKS
 from ..adapt.scan_surface import cuts_of
 from ..scan.flat_cuts import beyond
-from .shape_fit import ShapeFit
+from .shape_fit import Expression, ShapeFit
 from .shape_space import ShapeSpace
 from .sure import SURE
 
@@ -57,9 +57,9 @@ def judge(space: ShapeSpace, fit: ShapeFit, target: Surface, positions):
     return confidence, mid_air, missing
 
 
-def judge_together(positions, confidence, mid_air, rest, shut) -> dict[str, float]:
+def judge_together(positions, confidence, mid_air, rest, shown: Expression) -> dict[str, float]:
     """Confidence with those lowered that only look sure one by one: on ears under hair, of which few landmarks can be
-    placed, and on lids that nearly meet although the eye is not among the ``shut`` sides.
+    placed, on lids that nearly meet although the eye is not ``shown`` shut, and on lids that had to be held open.
 
     rest : the reference's own landmarks, name -> mm
     """
@@ -68,8 +68,8 @@ def judge_together(positions, confidence, mid_air, rest, shut) -> dict[str, floa
         ear = [f"{n}_{side}" for n in EAR_MARKS if f"{n}_{side}" in out]
         weak = sum(out[n] >= SURE and n not in mid_air for n in ear) < MOST_MARKS
         lids = [f"{n}_{side}" for n in ("ps", "pi", "en", "ex")]
-        slit = side not in shut and all(n in positions for n in lids)
-        slit = slit and _opening(positions, lids) < SLIT * _opening(rest, lids)
+        slit = side not in shown.shut and all(n in positions for n in lids)
+        slit = slit and (shown.wide or _opening(positions, lids) < SLIT * _opening(rest, lids))
         for name in (ear if weak else []) + (lids[:2] if slit else []):
             if name in out:
                 out[name] = min(out[name], 0.9 * SURE)

@@ -57,7 +57,7 @@ def fit_expression(space: ShapeSpace, target: Surface, fit: ShapeFit):
         return rival, shut
     if holes >= HOLED and max(shut_share(space, fit).values()) > DROOPED:
         wide = Expression(parted, wide=True)
-        fit = yield from _third(fit_shape(space, target, fit.pose, CHANGE, fit.coefficients, 1, wide, told), 2)
+        return (yield from _third(fit_shape(space, target, fit.pose, CHANGE, fit.coefficients, 1, wide, told), 2)), wide
     return fit, Expression(parted)
 
 

@@ -85,5 +85,5 @@ def find_landmarks(mesh: Mesh, reference: Head | None = None, unit_scales=(1.0,)
     outline = outline_of(space, fit, target) if shown.parted else None
     if outline is not None:
         positions |= {n: p for n, p in outline.corners.items() if n in positions}
-    confidence = judge_together(positions, confidence, mid_air, reference.landmark_positions(), shown.shut)
+    confidence = judge_together(positions, confidence, mid_air, reference.landmark_positions(), shown)
     return FoundLandmarks(positions, confidence, mid_air, missing, scale, misfit)
