@@ -6,13 +6,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..adapt.closest import Surface
-from ..adapt.scan_surface import NORMALS
+from ..adapt.scan_surface import NORMALS, cuts_of
 from ..adapt.thin_plate_spline import similarity
 from ..anatomy.head import Head
 from ..errors import InputError
 from ..mesh import Mesh, vertex_normals
 from ..progress import Progress, Work, portion
 from ..scan.face_match import face_template, surface_samples
+from ..scan.flat_cuts import beyond
 from .pose_search import LOOKING, STARTS, SURVIVORS, Pose, search_poses
 from .shape_fit import TRIAL, NoFaceError, fit_shape
 from .shape_space import ShapeSpace
@@ -84,11 +85,16 @@ def place_face(mesh: Mesh, reference: Head, space: ShapeSpace, unit_scales) -> W
 
 
 def _trials(look, few, mesh, samples, template, scale) -> Work:
-    """Work returning placements of the face in a mesh of ``scale`` mm per unit: misfit, scale, `ShapeFit`, `Surface`."""
+    """Work returning placements of the face in a mesh of ``scale`` mm per unit: misfit, scale, `ShapeFit`, `Surface`.
+
+    No face is looked for on flat ends.
+    """
+    target = Surface(mesh.vertices * scale, mesh.triangles, smooth=NORMALS).coarser()
+    ends = cuts_of(target)
+    samples = samples[~beyond(ends, samples * scale)]
     work = search_poses(samples * scale, look.size * template, look.tried, look.starts, look.survivors)
     poses = yield from portion(work, 0.0, 0.5)
     yield Progress(0.5, LOOKING)
-    target = Surface(mesh.vertices * scale, mesh.triangles, smooth=NORMALS).coarser()
     trials = []
     for k, pose in enumerate(poses):
         pose = replace(pose, scale=pose.scale * look.size)

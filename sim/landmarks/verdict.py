@@ -24,10 +24,12 @@ class Verdict(NamedTuple):
 def judged(reference: Head, space: ShapeSpace, fit: ShapeFit, relief: float) -> Verdict:
     """What to think of ``fit``, for which ``relief`` is enough.
 
-    Likeness counts twice: a skin that was bent far enough lies near anything.
+    Likeness counts twice, and how unlikely the shape is counts as well: a skin that was bent far enough lies near
+    anything, and a face upside down, its nose on the nose, has as much relief as a true one.
     """
     misfit, likeness = misfit_of(space, fit), likeness_of(reference, space, fit)
-    return Verdict(misfit > POOR or likeness < relief, misfit / max(likeness, 0.1) ** 2, likeness)
+    bad = misfit / max(likeness, 0.1) ** 2 * (1 + np.mean(fit.coefficients**2))
+    return Verdict(misfit > POOR or likeness < relief, float(bad), likeness)
 
 
 def likeness_of(reference: Head, space: ShapeSpace, fit: ShapeFit) -> float:
