@@ -183,7 +183,7 @@ def rounds_of(reference):
     return fine_fit.fine_fit(skin.vertices, skin.faces, free, np.zeros(n, dtype=bool), surface, none)
 
 
-@pytest.mark.parametrize("off, more", [(0.0, -1), (1.0, fine_fit.AGAIN)])
+@pytest.mark.parametrize("off, more", [(0.0, -1), ((fine_fit.NEAR + fine_fit.LEFT) / 2, 0), (1.0, fine_fit.AGAIN)])
 def test_there_are_as_many_rounds_as_the_skin_is_off_the_data(reference, monkeypatch, off, more):
     monkeypatch.setattr(fine_fit, "nearer", lambda base, moved, *rest: (moved, off))
     assert len(list(rounds_of(reference))) == len(fine_fit.SCHEDULE) + more

@@ -32,8 +32,9 @@ ALONG = 0.02  # weight of a pull along the surface against one across it
 AGREE = 0.6  # cosine between the normals of skin and scan
 WHOLE = 150.0  # mm²: a piece of data smaller than this is trusted in proportion
 FINE = 0.05  # stiffness below which data in between the cage's vertices is looked for too
-NEAR = 0.045  # mm off in the mean: a skin as near as that takes the last round at once, or is done with it
-AGAIN = 2  # times at most that the last round is repeated
+NEAR = 0.045  # mm off in the mean: a skin as near as that takes the last round at once
+LEFT = 0.06  # mm by which the last round may find the skin off, in the mean
+AGAIN = 2  # times at most that it is repeated if it is farther off
 LAST = 0.02  # stiffness below which rims look for data
 CLOSE = 1.5  # mm: how far they look
 
@@ -107,7 +108,7 @@ def fine_fit(cage, faces, free, rim, target: Surface, anchors: Anchors, stiffnes
     for turn, step in enumerate(soft + soft[-1:] * AGAIN):
         moved, off = nearer(base, moved, surface, tracked, anchors, smooth, step, soft[-1][0])
         yield (len(stiff) + turn + 1) / turns
-        if off <= NEAR and step[0] < LAST:
+        if off <= (LEFT if turn + 1 >= len(soft) else NEAR) and step[0] < LAST:
             break
     cage = base + moved
     now = surface.rows @ cage

@@ -16,10 +16,12 @@ def weld(vertices: np.ndarray, triangles: np.ndarray, tolerance: float = 1e-5):
     span = max(float((planes - low).max(initial=0)), 1e-9)
     grid = np.round((planes - low) / (tolerance * span)).astype(np.int64)
     key = (grid[0] << 42) ^ (grid[1] << 21) ^ grid[2]
-    _, first, back = np.unique(key, return_index=True, return_inverse=True)
-    merged = back.reshape(-1)[triangles]
-    vertices = vertices[first]
-    planes = vertices.T.copy()
+    in_order = np.sort(key)
+    merged = triangles
+    if (in_order[1:] == in_order[:-1]).any():  # sorting is enough to tell, and much faster
+        _, first, back = np.unique(key, return_index=True, return_inverse=True)
+        merged, vertices = back.reshape(-1)[triangles], vertices[first]
+        planes = vertices.T.copy()
     a, b, c = (planes.take(merged[:, k], axis=1) for k in range(3))
     longest = np.maximum.reduce([_squares(b - a), _squares(c - b), _squares(a - c)])
     area = np.sqrt(_squares(cross_sides(a, b, c)))

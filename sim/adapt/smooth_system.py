@@ -10,7 +10,7 @@ from ..mesh import edges
 FINEST = 4.0  # most by which fine parts of the mesh are stiffened
 STRETCH = 0.002  # weight of first differences, which keeps the mesh from sliding where bending is free
 #: Energy of what is left, against that of the pulls, at which the system counts as solved; as solved enough to go on from.
-SOLVED, ROUGHLY = 1e-5, 1e-4
+SOLVED, ROUGHLY = 1e-5, 3e-5
 FOLDED = 6.0  # factor on the stiffness around a fold
 
 
