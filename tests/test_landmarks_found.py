@@ -10,6 +10,10 @@ from headshop.sim.adapt.shut_eyes import with_shut_eyes
 from headshop.sim.anatomy.landmark_names import SKIN, mirrored
 from headshop.sim.landmarks.expression import HOLED, holes_in_eyes
 from headshop.sim.landmarks.find import find_landmarks
+from headshop.sim.landmarks.pose_search import Pose
+from headshop.sim.landmarks.shape_fit import ShapeFit
+from headshop.sim.landmarks.shape_space import shape_space
+from headshop.sim.landmarks.verdict import judged
 from headshop.sim.mesh import Mesh
 from headshop.sim.mesh_subdivision import drawn
 from headshop.sim.progress import finish
@@ -109,3 +113,17 @@ def test_eyes_with_holes_are_open_though_their_lids_have_lost_their_edges(refere
     for side in "lr":
         height = (marks[f"ps_{side}"] - marks[f"pi_{side}"])[2]
         assert (found.positions[f"ps_{side}"] - found.positions[f"pi_{side}"])[2] > 0.7 * height
+
+
+def test_of_two_places_a_face_fits_as_well_the_likelier_shape_is_better(reference):
+    space = shape_space(reference)
+    n, m = len(space.points), space.modes.shape[2]
+    pose = Pose(1.0, np.eye(3), np.zeros(3), 0.0)
+
+    def bad(coefficients):
+        fit = ShapeFit(space.points, coefficients, pose, np.ones(n), np.full(n, 1.0), np.zeros((m, 1)))
+        return judged(reference, space, fit, 0.5)
+
+    usual, odd = bad(np.full(m, 0.5)), bad(np.full(m, 1.5))
+    assert usual.likeness == odd.likeness and not usual.doubtful and not odd.doubtful
+    assert odd.bad > 2 * usual.bad

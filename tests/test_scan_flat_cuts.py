@@ -11,6 +11,7 @@ from headshop.sim.adapt.skin_fit import fit_skin
 from headshop.sim.anatomy.landmark_names import SKIN
 from headshop.sim.errors import InputError
 from headshop.sim.landmarks.confidence import judge
+from headshop.sim.landmarks.find import find_landmarks
 from headshop.sim.landmarks.pose_search import Pose
 from headshop.sim.landmarks.shape_fit import fit_shape
 from headshop.sim.landmarks.shape_space import shape_space
@@ -118,3 +119,17 @@ def test_who_wants_to_keep_a_flat_end_does(reference, cut_off, height):
     assert found["auto"] == 0 < found["never"]
     with pytest.raises(InputError, match="auto or never"):
         finish(build_head(reference, scan, given, leave_out="sometimes"))
+
+
+@pytest.mark.parametrize("seed", (1, 2, 3))
+def test_a_face_is_found_under_a_flat_top_in_any_turn(reference, cut_off, height, seed):
+    rng = np.random.default_rng(seed)
+    turn = np.linalg.qr(rng.standard_normal((3, 3)))[0]
+    turn *= np.linalg.det(turn)
+    vertices, triangles = cut_off
+    found = finish(find_landmarks(Mesh.from_triangles(vertices @ turn.T + 100.0, triangles), reference))
+    marks = reference.landmark_positions()
+    off = [
+        np.linalg.norm((found.positions[n] - 100.0) @ turn - marks[n]) for n in ("prn", "en_l", "ex_r", "ch_l", "gn")
+    ]
+    assert max(off) < 6
