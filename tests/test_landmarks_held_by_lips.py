@@ -4,6 +4,7 @@
 import numpy as np
 import pytest
 
+from headshop.sim.acting.plain_posing import plainly_posed
 from headshop.sim.adapt import build
 from headshop.sim.adapt.closest import Surface
 from headshop.sim.anatomy.landmark_names import SKIN
@@ -11,6 +12,8 @@ from headshop.sim.landmarks.first_look import first_look
 from headshop.sim.mesh import Mesh
 from headshop.sim.mesh_subdivision import smoother
 from headshop.sim.progress import finish
+from headshop.sim.relax.mouth_gap import MARKS
+from headshop.sim.relax.parted import parted_lips
 
 RADIUS, LONG = 4.0, 38.0  # mm of the tube
 ASIDE = 9.0  # mm from the middle of the mouth to the tube, to the subject's right
@@ -113,3 +116,21 @@ def test_the_head_has_no_tube_and_says_so(reference, marks, scan, face, tube):
     behind = np.linalg.norm(built.head.skin.vertices - (marks["sto"] + [-ASIDE, 0, -12]), axis=1) < 3
     assert behind.any() and built.attributes["fitted"][behind & outside].max() == 0
     assert np.isnan(built.attributes["distance_mm"][behind & outside]).all()
+
+
+def test_parted_lips_are_told_where_their_landmarks_are_not_given(reference, marks, face):
+    """An open mouth whose lower lip nobody marked is known to be open all the same."""
+    posed = plainly_posed(reference, jaw_open=0.35)
+    places = {n: p for n, p in posed.landmark_positions().items() if n in SKIN}
+    rows, quads = smoother(posed.skin.faces, len(posed.skin.vertices))
+    vertices = rows @ posed.skin.vertices
+    inner = rows @ reference.groups["inner"] > 0.5
+    triangles = Mesh(vertices, quads).triangles
+    scan = Surface(vertices, triangles[~inner[triangles].any(axis=1)], smooth=2.0)
+    given = {n: p for n, p in places.items() if n not in ("li", "ls", "sto")}
+    look = finish(first_look(reference, scan, given))
+    assert set(look.lips) == set(MARKS)
+    assert parted_lips(reference, scan, given) is None
+    found = parted_lips(reference, scan, given, look.lips)
+    assert found is not None and np.linalg.norm(found.edges[0] - found.edges[1]) > 4
+    assert finish(first_look(reference, Surface(*face, smooth=2.0), marks)).lips is None

@@ -66,21 +66,25 @@ def landmark_rows(points: SurfacePoints, names, n: int) -> csr_matrix:
     return csr_matrix((points.weights[at].ravel(), (rows, points.corners[at].ravel())), shape=(len(at), n))
 
 
-def fit_skin(reference: Head, target: Surface, given: dict[str, np.ndarray], ajar: bool = False) -> Work:
+def fit_skin(
+    reference: Head, target: Surface, given: dict[str, np.ndarray], lips: dict[str, np.ndarray] | None = None
+) -> Work:
     """Work returning the `SkinFit` of ``reference`` to the scan ``target`` with the landmarks ``given`` (mm).
 
-    ajar : the lips are known to be apart, if only a little
+    lips : name -> (3,) mm, about where landmarks of lips are that are known to be apart, if only a little
 
     It is the surface drawn of the skin, the limit of its subdivision, that is laid on the scan.
     """
-    return on_one_thread(_fitting(reference, target, given, ajar))
+    return on_one_thread(_fitting(reference, target, given, lips))
 
 
-def _fitting(reference: Head, target: Surface, given: dict[str, np.ndarray], ajar: bool) -> Work:
+def _fitting(
+    reference: Head, target: Surface, given: dict[str, np.ndarray], apart: dict[str, np.ndarray] | None
+) -> Work:
     yield Progress(0.0, "Looking at lids and lips")
     data = target.coarser()
     lips_closed, closed = as_scanned(reference, given)
-    whole, given, lips = with_lips_as_scanned(lips_closed, target, given, ajar)
+    whole, given, lips = with_lips_as_scanned(lips_closed, target, given, apart)
     reference = whole.with_vertices({"skin": drawn(whole.skin.faces, whole.skin.vertices)})
     skin = reference.skin
     n = len(skin.vertices)
@@ -166,12 +170,12 @@ def as_scanned(reference: Head, given) -> tuple[Head, tuple[str, ...]]:
     return (with_shut_eyes(reference, closed) if closed else reference), closed
 
 
-def with_lips_as_scanned(reference: Head, target: Surface, given, ajar: bool = False):
+def with_lips_as_scanned(reference: Head, target: Surface, given, lips=None):
     """The reference with its lips parted if the scan's are, the landmarks to fit it by, and the edges of its lips:
     vertices (k,) and places (k, 3) mm."""
     from ..relax.parted import parted_lips, with_parted_lips
 
-    found = parted_lips(reference, target, given, ajar)
+    found = parted_lips(reference, target, given, lips)
     if found is None:
         return reference, given, (np.zeros(0, dtype=int), np.zeros((0, 3)))
     given = {name: place for name, place in given.items() if name != "sto"}  # it lies in mid-air

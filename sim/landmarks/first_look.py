@@ -13,6 +13,7 @@ from ..adapt.skin_fit import SkinFit
 from ..adapt.thin_plate_spline import similarity
 from ..anatomy.head import Head
 from ..progress import Work
+from ..relax.mouth_gap import MARKS
 from .expression import fit_expression
 from .held_by_lips import held_by_lips
 from .hidden_skin import hidden_skin, with_hidden_skin
@@ -28,14 +29,14 @@ FEWEST = 4  # landmarks that tell where the head is
 
 @dataclass(frozen=True, eq=False)
 class FirstLook:
-    """landmarks : name -> (3,) mm, those given and those of eyes that are shut; parted : the lips are, if only a little;
-    target : the scan without what the lips hold; held_mm2 : how much of it that is; filled : with skin behind it, as it
-    probably is; hidden (k,) : vertices of the reference's skin that make that up."""
+    """landmarks : name -> (3,) mm, those given and those of eyes that are shut; lips : about where their landmarks are if
+    they are parted, if only a little, or None; target : the scan without what the lips hold; held_mm2 : how much of it that
+    is; filled : with skin behind it, as it probably is; hidden (k,) : vertices of the reference's skin that make that up."""
 
     landmarks: dict[str, np.ndarray]
     target: Surface
     filled: Surface
-    parted: bool = False
+    lips: dict[str, np.ndarray] | None = None
     held_mm2: float = 0.0
     hidden: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
 
@@ -66,10 +67,12 @@ def first_look(reference: Head, target: Surface, given: dict[str, np.ndarray], k
     except NoFaceError:
         return FirstLook(given, target, target)
     landmarks = given | shut_lids(space, fit, shown, coarse, given)
+    laid = space.landmarks(fit.points)
+    lips = {name: laid[name] for name in MARKS} if shown.parted else None
     if keep_held:
-        return FirstLook(landmarks, target, target, shown.parted)
+        return FirstLook(landmarks, target, target, lips)
     held = held_by_lips(space, fit, target)
     left = target.without(held)
     hidden = hidden_skin(space, fit, target.vertices[target.triangles[held].ravel()], left)
     filled = with_hidden_skin(space, fit, hidden, left)
-    return FirstLook(landmarks, left, filled, shown.parted, float(target.area[held].sum()), space.vertices[hidden])
+    return FirstLook(landmarks, left, filled, lips, float(target.area[held].sum()), space.vertices[hidden])

@@ -43,10 +43,11 @@ class PartedLips:
     edges: np.ndarray
 
 
-def parted_lips(reference: Head, target: Surface, given, ajar: bool = False) -> PartedLips | None:
+def parted_lips(reference: Head, target: Surface, given, lips=None) -> PartedLips | None:
     """How the mouth of a scan ``target`` with the landmarks ``given`` (name -> mm) is open; None: its lips are closed.
 
-    ajar : they are known to be apart, if only a little
+    lips : name -> (3,) mm, about where their landmarks are, if they are known to be apart, if only a little; None: it is not
+        known
     """
     names = [name for name in given if name in reference.landmarks.names and name != "sto"]
     if len(names) < 6 or not answers(reference):
@@ -55,11 +56,11 @@ def parted_lips(reference: Head, target: Surface, given, ajar: bool = False) -> 
     marks, goal = (np.array([of[name] for name in names]) for of in (rest, given))
     matrix, _ = similarity(marks, goal)
     forward = -matrix[:, 1] / np.linalg.norm(matrix[:, 1])
-    first = np.array([-0.25, 0.0, 0.25])
-    if opening(lip_edges(target, given, forward, first), first) < (AJAR if ajar else APART):
+    first, about = np.array([-0.25, 0.0, 0.25]), (lips or {}) | given
+    if opening(lip_edges(target, about, forward, first), first) < (AJAR if lips else APART):
         return None
     looked = np.linspace(-ASIDE, ASIDE, LINES)
-    edges = lip_edges(target, given, forward, looked)
+    edges = lip_edges(target, about, forward, looked)
     pairs, shares = rim_pairs(reference)
     edges = smoothed(edges, looked, shares)
     seen = np.isfinite(edges).all(axis=(1, 2)) & (np.linalg.norm(edges[:, 0] - edges[:, 1], axis=1) > TOLD)
