@@ -14,7 +14,7 @@ from ..adapt.closest import Surface
 from .shape_fit import ShapeFit
 from .shape_space import ShapeSpace
 
-#: mm, all on a head of the reference's size. Faces of 20 people, smiling or not, stand off by up to 6.3 mm over more than
+#: mm, all on a head of the reference's size. Faces in 19 scans, smiling or not, stand off by up to 6.3 mm over more than
 #: 40 mm²; a breathing tube by 11.5 over 500.
 AROUND = 45.0  # from where the lips meet that is looked at
 REACH = 25.0  # that a thing may stand off
