@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is chosen in the Build panel or on the command line is what a head is built with."""
+
+import pytest
+
+from headshop.headshop_addon.command_line import main
+from headshop.sim.adapt.landmarks import write_landmarks
+from headshop.sim.errors import InputError
+from headshop.sim.progress import Progress, finish
+from headshop.sim.scan.ply import write_ply
+
+
+@pytest.fixture
+def asked(blender, monkeypatch):
+    """The choices that builds were asked for, the first of which is as far as they get."""
+    from headshop.headshop_addon import pipeline
+
+    out = []
+
+    def build_head(reference, scan, landmarks, detail, relax, leave_out):
+        out.append((relax, leave_out))
+        yield Progress(0.0, "Asked")
+        raise InputError("That is enough.")
+
+    monkeypatch.setattr(pipeline, "build_head", build_head)
+    return out
+
+
+def test_choices_of_the_panel(addon, asked, reference):
+    from headshop.headshop_addon import bridge, scan_landmarks, scan_objects
+
+    scan = bridge.mesh_to_object(reference.skin, "Scan")
+    addon.context.scene.collection.objects.link(scan)
+    scan_landmarks.replace(scan, reference.landmark_positions())
+    for relax, leave_out in (("AUTO", "AUTO"), ("NEVER", "AUTO"), ("AUTO", "NEVER")):
+        addon.context.scene.headshop.relax, addon.context.scene.headshop.leave_out = relax, leave_out
+        with pytest.raises(InputError, match="enough"):
+            finish(scan_objects.build(addon.context, scan))
+        assert asked.pop() == (relax.lower(), leave_out.lower())
+
+
+def test_choices_on_the_command_line(asked, reference, tmp_path):
+    scan, landmarks = tmp_path / "scan.ply", tmp_path / "landmarks.json"
+    write_ply(scan, reference.skin)
+    write_landmarks(landmarks, reference.landmark_positions())
+    for words, wanted in (
+        ([], ("auto", "auto")),
+        (["--relax", "always"], ("always", "auto")),
+        (["--leave-out", "never"], ("auto", "never")),
+    ):
+        paths = [str(scan), "--landmarks", str(landmarks), "-o", str(tmp_path / "head.blend")]
+        assert main(["build", "--quiet", *paths, *words]) == 2
+        assert asked.pop() == wanted
