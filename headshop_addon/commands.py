@@ -26,11 +26,11 @@ def version() -> None:
 
 def build(options) -> None:
     """A scan, and landmarks if there are, to a head in a .blend, with plain files if asked for."""
-    from ..sim.adapt.landmarks import read_landmarks
+    from ..sim.adapt.landmarks import read_landmark_file
 
     _require_file(options.scan, "scan")
     _require_kind(options.output, _BLEND)
-    landmarks = None if options.landmarks is None else read_landmarks(options.landmarks)
+    landmarks = None if options.landmarks is None else read_landmark_file(options.landmarks)
     with Outputs() as outputs:
         blend = outputs.file(options.output)
         plain = _plain_folder(outputs, options)
@@ -42,7 +42,8 @@ def build(options) -> None:
         if landmarks is None:
             work = pipeline.build_alone(options.scan, name, options.units, options.up, **wanted)
         else:
-            work = pipeline.build_file(options.scan, landmarks, name, options.units, options.up, **wanted)
+            wanted["found"] = landmarks.found
+            work = pipeline.build_file(options.scan, landmarks.positions, name, options.units, options.up, **wanted)
         skin, report = _run(work, options)
         set_up_view(skin)
         save(blend)

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """From a scan file and landmarks to a head in the scene: the one path that operators and the command line share."""
 
+from collections.abc import Collection
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
@@ -114,12 +115,13 @@ def build(
     detail: int = SIZE,
     relax: str = "auto",
     leave_out: str = "auto",
+    found: Collection[str] = (),
 ) -> Work:
     """Fit the reference head to ``scan`` and put it into the scene; returns (skin object, report).
 
     ``landmarks`` are in the scan's place (mm); ``detail`` is the side of the detail maps in pixels, 0 for none.
     ``relax`` is one of `sim.relax.choice.CHOICES`; a face that is relaxed keeps itself as scanned in a shape key.
-    ``leave_out`` is one of `sim.adapt.scan_surface.CHOICES`.
+    ``leave_out`` is one of `sim.adapt.scan_surface.CHOICES`; ``found`` names the landmarks that nobody picked.
     Closing the generator leaves the scene as it was.
 
     Raises
@@ -130,7 +132,8 @@ def build(
     with timed(seconds, "fit"):
         yield Progress(0.0, "Reading the reference head")
         reference = load_head()
-        result = yield from portion(build_head(reference, scan.mesh, landmarks, detail, relax, leave_out), 0.02, 0.9)
+        work = build_head(reference, scan.mesh, landmarks, detail, relax, leave_out, found)
+        result = yield from portion(work, 0.02, 0.9)
     yield Progress(0.9, "Placing the head")
     report = {
         "scan": scan.report,
@@ -179,8 +182,8 @@ def build_alone(path, name: str, unit: str | None = None, up: str | None = None,
     InputError : the file cannot be read, is no head, or shows no face.
     """
     scan, found = yield from portion(load_scan_alone(path, unit, up), 0.0, 0.35)
-    skin, report = yield from portion(build(scan, found.sure(), name, **options), 0.35, 1.0)
-    return skin, report
+    sure = found.sure()
+    return (yield from portion(build(scan, sure, name, found=sure, **options), 0.35, 1.0))
 
 
 @contextmanager

@@ -55,11 +55,17 @@ def forget(scan, *names: str) -> None:
             item.state, item.confidence, item.mid_air = "MISSING", 0.0, False
 
 
-def replace(scan, placed: dict) -> None:
-    """Forget all landmarks, place the given ones (mm) and let the others follow."""
+def replace(scan, placed: dict, confidence: dict | None = None) -> None:
+    """Forget all landmarks, place the given ones (mm) and let the others follow.
+
+    confidence : name -> 0..1, of those among them that were found, not placed
+    """
     forget(scan)
     for name, position in placed.items():
-        put(scan, name, position)
+        there = (confidence or {}).get(name, 0.0)
+        put(scan, name, position, "FOUND" if there else "PLACED")
+        item = entries(scan)[name]
+        item.found, item.confidence = item.co, there
     follow(scan)
 
 
@@ -110,6 +116,12 @@ def to_build(scan) -> dict[str, np.ndarray]:
 
     sure = {i.name for i in scan.headshop.landmarks if i.confidence >= SURE and not i.mid_air}
     return {n: p for n, p in positions(scan, "FOUND").items() if n in sure} | positions(scan)
+
+
+def nobody_placed(scan) -> dict[str, float]:
+    """Those of `to_build` that were found, not placed by hand: name -> confidence, 0..1."""
+    used = to_build(scan)
+    return {i.name: i.confidence for i in scan.headshop.landmarks if i.state == "FOUND" and i.name in used}
 
 
 def _follow_found(scan, placed) -> None:

@@ -12,7 +12,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix, Vector
 
-from ..sim.adapt.landmarks import read_landmarks, write_landmarks
+from ..sim.adapt.landmarks import read_landmark_file, write_landmarks
 from ..sim.anatomy.landmark_names import SKIN
 from ..sim.errors import InputError
 from ..sim.progress import Work, finish
@@ -130,8 +130,9 @@ def load_landmarks(scan: bpy.types.Object, path) -> int:
     InputError : the file cannot be used (`sim.adapt.landmarks`).
     """
     turn = _rotation(scan)
-    read = {name: turn @ position for name, position in read_landmarks(path).items() if name in SKIN}
-    scan_landmarks.replace(scan, read)
+    file = read_landmark_file(path)
+    read = {name: turn @ position for name, position in file.positions.items() if name in SKIN}
+    scan_landmarks.replace(scan, read, file.found)
     return len(read)
 
 
@@ -142,7 +143,8 @@ def save_landmarks(scan: bpy.types.Object, path) -> int:
     """
     turn = _rotation(scan)
     placed = scan_landmarks.to_build(scan)
-    write_landmarks(path, {n: p @ turn for n, p in placed.items()}, [n for n in SKIN if n not in placed])
+    missing = [n for n in SKIN if n not in placed]
+    write_landmarks(path, {n: p @ turn for n, p in placed.items()}, missing, scan_landmarks.nobody_placed(scan))
     return len(placed)
 
 
@@ -168,6 +170,7 @@ def build(context, scan: bpy.types.Object, name: str = "") -> Work:
         context.scene,
         relax=context.scene.headshop.relax.lower(),
         leave_out=context.scene.headshop.leave_out.lower(),
+        found=scan_landmarks.nobody_placed(scan),
     )
     skin.matrix_world = scan.matrix_world
     scan.hide_viewport = True

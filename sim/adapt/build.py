@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Scan and landmarks in, a whole head out (Kähler et al. 2002, section 6)."""
 
+from collections.abc import Collection
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -64,6 +65,7 @@ def build_head(
     detail: int = SIZE,
     relax: str = "auto",
     leave_out: str = "auto",
+    found: Collection[str] = (),
 ) -> Work:
     """Work returning the `BuildResult` for a scan (mm, any place) with four or more ``landmarks`` (name -> mm).
 
@@ -71,6 +73,7 @@ def build_head(
     relax : ``auto`` makes a face neutral whose lips are parted (`sim.relax`), ``always`` any, ``never`` none. The figures
         in ``fit`` are those of the face as scanned.
     leave_out : ``auto`` leaves out of the scan what is no skin, flat ends and what the lips hold, ``never`` nothing
+    found : names of the landmarks that nobody picked: the skin is held to them more loosely
 
     Raises
     ------
@@ -91,7 +94,7 @@ def build_head(
     yield Progress(0.08, "Judging the landmarks")
     check_on_surface(given, target)
     look = yield from portion(first_look(reference, target, given, leave_out == "never"), 0.1, 0.3)
-    fit = yield from portion(fit_skin(reference, look.filled, look.landmarks, look.lips), 0.3, 0.6)
+    fit = yield from portion(fit_skin(reference, look.filled, look.landmarks, look.lips, found), 0.3, 0.6)
     fit = look.seen_only(fit)
     yield Progress(0.6, "Judging the fit")
     refuse_poor(fit_report(reference, fit, given))

@@ -1,11 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Landmark files: ``{"format": "headshop-landmarks/1", "units": "mm", "landmarks": {name: [x, y, z]}, "missing": []}``.
 
-Any subset of four or more landmarks that do not lie in a plane is legal; further keys are tolerated.
+Any subset of four or more landmarks that do not lie in a plane is legal; further keys are tolerated. Files of found landmarks
+have ``confidence`` {name: 0..1}, ``mid_air`` [name] and ``found`` {name: [x, y, z]}: a landmark that lies elsewhere than it was
+found has been corrected, and is as good as any that was picked.
 """
 
 import difflib
 import json
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +26,15 @@ FLAT = 0.03  # thickness over length below which landmarks count as lying in one
 
 #: Pairs that do coincide on a closed mouth or a closed eye.
 _MAY_TOUCH = ({"ls", "sto"}, {"sto", "li"}, {"ps_l", "pi_l"}, {"ps_r", "pi_r"}, {"n", "se"})
+
+
+@dataclass(frozen=True, eq=False)
+class LandmarkFile:
+    """What a landmark file says: positions, name -> (3,) mm; found : name -> confidence 0..1, those of them that were found
+    and not touched since."""
+
+    positions: dict[str, np.ndarray]
+    found: dict[str, float] = field(default_factory=dict)
 
 
 def _suggestion(name: str) -> str:
@@ -67,8 +79,13 @@ def _once(pairs):
 
 
 def read_landmarks(path) -> dict[str, np.ndarray]:
-    """Landmark name -> (3,) mm of a landmark file; names listed as missing are left out, and so are those
-    that a file of found landmarks calls mid-air or hardly sure.
+    """Landmark name -> (3,) mm of a landmark file, see `read_landmark_file`."""
+    return read_landmark_file(path).positions
+
+
+def read_landmark_file(path) -> LandmarkFile:
+    """The `LandmarkFile` at ``path``; names listed as missing are left out, and so are those that were found, but in
+    mid-air or hardly surely, and not corrected.
 
     Raises
     ------
@@ -93,8 +110,8 @@ def read_landmarks(path) -> dict[str, np.ndarray]:
     return parse_landmarks(document, str(path))
 
 
-def parse_landmarks(document, source: str = "The landmark file") -> dict[str, np.ndarray]:
-    """Like `read_landmarks`, from the parsed JSON; ``source`` begins the sentences about what is wrong."""
+def parse_landmarks(document, source: str = "The landmark file") -> LandmarkFile:
+    """Like `read_landmark_file`, from the parsed JSON; ``source`` begins the sentences about what is wrong."""
     if not isinstance(document, dict) or "format" not in document:
         raise InputError(f'{source} is no landmark file: it needs "format": "{FORMAT}".')
     if document["format"] != FORMAT:
@@ -110,19 +127,24 @@ def parse_landmarks(document, source: str = "The landmark file") -> dict[str, np
     for name in [*given, *(m for m in missing if isinstance(m, str))]:
         if name not in SKIN:
             raise InputError(f'{source} names an unknown landmark "{name}"{_suggestion(name)}.')
-    left = {m for m in missing if isinstance(m, str)} | _unsure(document)
+    found = _found(document)
+    sure = {n for n, c in found.items() if c >= SURE}
+    left = {m for m in missing if isinstance(m, str)} | (found.keys() - sure)
     positions = {n: _position(source, n, p) for n, p in given.items() if n not in left}
     require_usable(positions, source)
-    return positions
+    return LandmarkFile(positions, {n: found[n] for n in found if n in positions})
 
 
-def _unsure(document) -> set[str]:
-    """Names that a file of found landmarks says are in mid-air or hardly sure: no evidence to fit a head to."""
+def _found(document) -> dict[str, float]:
+    """Name -> confidence of the landmarks that were found and lie where they were; 0 in mid-air, which is no evidence to
+    fit a head to."""
     confidence, mid_air = document.get("confidence"), document.get("mid_air")
     if not isinstance(confidence, dict) or not isinstance(mid_air, list):
-        return set()
-    low = {n for n, c in confidence.items() if isinstance(c, (int, float)) and c < SURE}
-    return low | {n for n in mid_air if isinstance(n, str)}
+        return {}
+    given, places = document["landmarks"], document.get("found")
+    same = {n for n in given if not isinstance(places, dict) or places.get(n) == given[n]}
+    sure = {n: float(c) for n, c in confidence.items() if n in same and isinstance(c, (int, float))}
+    return sure | {n: 0.0 for n in mid_air if isinstance(n, str) and n in same}
 
 
 def require_usable(positions: dict[str, np.ndarray], source: str = "The landmark file") -> None:
@@ -150,7 +172,7 @@ def require_usable(positions: dict[str, np.ndarray], source: str = "The landmark
 def write_landmarks(path, positions: dict[str, np.ndarray], missing=(), confidence=None, mid_air=()) -> None:
     """Write a landmark file: positions in mm (skin or skull landmarks), and the names that were ``missing``.
 
-    confidence : name -> 0..1 and ``mid_air`` names, of landmarks found automatically
+    confidence : name -> 0..1 and ``mid_air`` names, of those that were found and not corrected
     """
     order = {name: k for k, name in enumerate((*SKIN, *(n for n in landmark_names.SKULL if n not in SKIN)))}
     names = sorted(positions, key=order.__getitem__)
@@ -162,5 +184,6 @@ def write_landmarks(path, positions: dict[str, np.ndarray], missing=(), confiden
     }
     if confidence is not None:
         document["mid_air"] = sorted(mid_air, key=order.__getitem__)
-        document["confidence"] = {n: round(float(confidence[n]), 3) for n in names}
+        document["confidence"] = {n: round(float(confidence[n]), 3) for n in names if n in confidence}
+        document["found"] = {n: document["landmarks"][n] for n in document["confidence"]}
     write_atomically(path, (json.dumps(document, indent=1) + "\n").encode())

@@ -148,19 +148,25 @@ def closed_eyes(reference: Head, landmarks, given) -> list[str]:
 
 
 def rim_anchors(reference: Head, rim, matrix) -> Anchors:
-    """Pairs of rim points as rows of the last stage's system; targets are positions, so rows are differences.
+    """Pairs of rim points that stay together; see `offset_anchors`."""
+    pairs = [lip_pairs(reference, rim), lip_linings(reference)]
+    pairs += [touching_lids(reference, rim, side) for side in ("l", "r")]
+    return offset_anchors(reference, np.unique(np.concatenate(pairs), axis=0), matrix, TOGETHER)
+
+
+def offset_anchors(reference: Head, pairs, matrix, weight: float) -> Anchors:
+    """Pairs (k, 2) of vertices that keep their offset, as rows of the last stage's system; targets are positions, so rows are
+    differences.
 
     matrix (3, 3) turns and scales the reference's offsets into the scan's place.
     """
     v = reference.skin.vertices
     n = len(v)
-    pairs = [lip_pairs(reference, rim), lip_linings(reference)]
-    pairs += [touching_lids(reference, rim, side) for side in ("l", "r")]
-    upper, lower = np.unique(np.concatenate(pairs), axis=0).T
+    upper, lower = pairs.T
     k = len(upper)
     place = (np.tile(np.arange(k), 2), np.concatenate([upper, lower]))
     sampling = coo_matrix((np.repeat([1.0, -1.0], k), place), shape=(k, n)).tocsr()
-    return Anchors(sampling, (v[upper] - v[lower]) @ matrix.T, np.full(k, TOGETHER))
+    return Anchors(sampling, (v[upper] - v[lower]) @ matrix.T, np.full(k, weight))
 
 
 def touching_lids(reference: Head, rim, side: str) -> np.ndarray:

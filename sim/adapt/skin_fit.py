@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The skin of the reference fitted to a scan: warp, refine, reach the data (Kähler et al. 2002, section 6)."""
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,9 +15,9 @@ from ..mesh_subdivision import drawn, undrawn
 from ..progress import Progress, Work
 from .closest import Surface
 from .completion import complete_positions, mirror_plane, sigma
-from .ears import unseen_ears
+from .ears import EAR_MARKS, ear_sheets, unseen_ears
 from .fine_fit import Anchors, Fitted, fine_fit
-from .openings import closed_eyes, lid_margins, rim_anchors, rims
+from .openings import closed_eyes, lid_margins, offset_anchors, rim_anchors, rims
 from .refine import Pairs, refine
 from .shut_eyes import with_shut_eyes
 from .skin_groups import group
@@ -31,7 +32,11 @@ LID_MARKS = ("ps_l", "ps_r", "pi_l", "pi_r")
 LOOSE = 20.0  # how much less the shape of a lid's margin counts in an eye that is as open as the reference's
 REFINED = 1  # rounds of refinement: what is finer slides
 UNSURE = 0.3  # mm along the surface by which sliding may miss a landmark, per mm of smoothing
+THICKNESS = 0.05  # weight in the last stage of how thick an ear is
 HOLD = 0.15  # weight in the last stage of a landmark picked to 1 mm, against 1 for a point of data
+#: Of landmarks that were found, not picked: factors on how far sliding may miss them, and on their weight in the last stage.
+#: Not of ears', in whose folds data alone would lead astray.
+FOUND_MISS, FOUND_HOLD = 6.0, 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,19 +72,28 @@ def landmark_rows(points: SurfacePoints, names, n: int) -> csr_matrix:
 
 
 def fit_skin(
-    reference: Head, target: Surface, given: dict[str, np.ndarray], lips: dict[str, np.ndarray] | None = None
+    reference: Head,
+    target: Surface,
+    given: dict[str, np.ndarray],
+    lips: dict[str, np.ndarray] | None = None,
+    found: Collection[str] = (),
 ) -> Work:
     """Work returning the `SkinFit` of ``reference`` to the scan ``target`` with the landmarks ``given`` (mm).
 
     lips : name -> (3,) mm, about where landmarks of lips are that are known to be apart, if only a little
+    found : names of those given that nobody picked; the data around them count for more
 
     It is the surface drawn of the skin, the limit of its subdivision, that is laid on the scan.
     """
-    return on_one_thread(_fitting(reference, target, given, lips))
+    return on_one_thread(_fitting(reference, target, given, lips, found))
 
 
 def _fitting(
-    reference: Head, target: Surface, given: dict[str, np.ndarray], apart: dict[str, np.ndarray] | None
+    reference: Head,
+    target: Surface,
+    given: dict[str, np.ndarray],
+    apart: dict[str, np.ndarray] | None,
+    found: Collection[str],
 ) -> Work:
     yield Progress(0.0, "Looking at lids and lips")
     data = target.coarser()
@@ -97,6 +111,7 @@ def _fitting(
     landmarks = complete_positions(dict(zip(names, marks, strict=True)), given)
     goal = np.array([landmarks[name] for name in names])
     known = np.array([name in given for name in names])
+    loose = np.array([name in found and name.partition("_")[0] not in EAR_MARKS for name in names])
     give = np.where(known, [PICKED * sigma(name) for name in names], CARRIED)
     rim = rims(reference)
     turn, shift = similarity(marks, goal)
@@ -133,7 +148,9 @@ def _fitting(
         moved = warp.transform(moved)
 
     rest = skin.vertices @ turn.T + shift
-    pairs = Pairs(np.concatenate([rows @ rest, rest[margin]]), aim, UNSURE * give, len(names))
+    miss = UNSURE * give
+    miss[: len(names)][loose] *= FOUND_MISS
+    pairs = Pairs(np.concatenate([rows @ rest, rest[margin]]), aim, miss, len(names))
     sites = spread_sites(skin.vertices, calm, group(reference, "face") > 0.5)
     yield Progress(0.25, "Slide over the scan")
     point, normal = mirror_plane(dict(zip(names, marks, strict=True)))
@@ -142,14 +159,16 @@ def _fitting(
 
     free, stiffness = freedom(reference, given, rim, unseen)
     weight = np.where(known, [HOLD / sigma(name) ** 2 for name in names], 0.0)
+    weight[loose] *= FOUND_HOLD
     weight[np.isin(names, LID_MARKS)] *= 1 - 0.9 * pinched
     matrix, _ = similarity(skin.vertices, moved)
     together = rim_anchors(reference, rim, matrix)
+    thick = offset_anchors(reference, ear_sheets(reference), matrix, THICKNESS)
     on_margin = csr_matrix((np.ones(len(margin)), (np.arange(len(margin)), margin)), shape=(len(margin), n))
     anchors = Anchors(
-        vstack([rows, on_margin, together.sampling]).tocsr(),
-        np.concatenate([goal, margin_goal, together.target]),
-        np.concatenate([weight, HOLD * sure**2, together.weight]),
+        vstack([rows, on_margin, together.sampling, thick.sampling]).tocsr(),
+        np.concatenate([goal, margin_goal, together.target, thick.target]),
+        np.concatenate([weight, HOLD * sure**2, together.weight, thick.weight]),
     )
     start = undrawn(skin.faces, moved + (whole.skin.vertices - skin.vertices) @ matrix.T, moved)
     work = fine_fit(start, skin.faces, free, rim & ~unseen, data, anchors, stiffness)

@@ -9,6 +9,9 @@ from ..mesh import edges
 
 FINEST = 4.0  # most by which fine parts of the mesh are stiffened
 STRETCH = 0.002  # weight of first differences, which keeps the mesh from sliding where bending is free
+#: Least weight of first differences against bending. Skin beyond the data is moved as its edge is; it does not go on along
+#: the slope there, which the noise of few data tells.
+CALM = 0.02
 #: Energy of what is left, against that of the pulls, at which the system counts as solved; as solved enough to go on from.
 SOLVED, ROUGHLY = 1e-5, 3e-5
 FOLDED = 6.0  # factor on the stiffness around a fold
@@ -63,7 +66,7 @@ class Smoothness:
     def __init__(self, vertices, faces, stiffness):
         self._bend = laplacian(vertices, faces)
         self._stiffness = np.asarray(stiffness, dtype=float) * fineness(vertices, faces)
-        self._calm = (STRETCH * stretch(self._bend)).tocsr()
+        self._stretch = stretch(self._bend).tocsr()
         self._weigh()
 
     def _weigh(self):
@@ -72,7 +75,7 @@ class Smoothness:
 
     def matrix(self, soft: float) -> csr_matrix:
         """(n, n) with the energy of bending times ``soft``."""
-        return soft * self._bending + self._calm
+        return soft * self._bending + max(STRETCH, CALM * soft) * self._stretch
 
     def stiffen(self, at) -> None:
         """Make the surroundings of the vertices ``at`` (n,) bool stiffer: they folded."""

@@ -6,7 +6,7 @@ from scipy.spatial import cKDTree
 
 from ..adapt.closest import Surface
 from ..adapt.completion import sigma
-from ..adapt.ears import EAR_MARKS, MOST_MARKS
+from ..adapt.ears import EAR_MARKS, SOME_MARKS
 from ..adapt.scan_surface import cuts_of
 from ..scan.flat_cuts import beyond
 from .shape_fit import Expression, ShapeFit
@@ -17,6 +17,10 @@ AROUND = 9.0  # mm: skin about a landmark that must have data
 MID_AIR = 3.0  # mm: a landmark farther from the scan hangs in mid-air
 LOST = 11.0  # mm: a landmark less certain than that is missing
 UNSURE = 8.0  # mm of doubt that halve the confidence
+LIES = 2.5  # mm from the scan within which skin lies on it
+#: Sure landmarks of an ear that tell that the scan shows it, and not hair; fewer do where, of the skin of the ear that finds
+#: the scan, so large a share lies on it: .53 and .57 of ears under hair, from .74 of 30 others.
+MOST_MARKS, LIKE_AN_EAR = 5, 0.66
 SLIT = 0.5  # opening of lids against the reference's below which open eyes were not read well
 UNSEEN = ("tr",)  # no shape tells where hair begins
 
@@ -31,7 +35,7 @@ def doubt(space: ShapeSpace, fit: ShapeFit) -> dict[str, float]:
 
 def support(space: ShapeSpace, fit: ShapeFit) -> dict[str, float]:
     """Name -> 0..1, share of the skin around each landmark that lies on the scan."""
-    on = fit.trust * (np.abs(np.nan_to_num(fit.distance, nan=9.0)) < 2.5)
+    on = fit.trust * (np.abs(np.nan_to_num(fit.distance, nan=9.0)) < LIES)
     tree = cKDTree(fit.points)
     places = space.landmarks(fit.points)
     near = tree.query_ball_point(np.array(list(places.values())), AROUND * fit.pose.scale)
@@ -57,22 +61,33 @@ def judge(space: ShapeSpace, fit: ShapeFit, target: Surface, positions):
     return confidence, mid_air, missing
 
 
-def judge_together(positions, confidence, mid_air, rest, shown: Expression) -> dict[str, float]:
+def judge_together(positions, confidence, mid_air, rest, shown: Expression, like_ears) -> dict[str, float]:
     """Confidence with those lowered that only look sure one by one: on ears under hair, of which few landmarks can be
     placed, on lids that nearly meet although the eye is not ``shown`` shut, and on lids that had to be held open.
 
-    rest : the reference's own landmarks, name -> mm
+    rest : the reference's own landmarks, name -> mm; like_ears : see the function `like_ears`
     """
     out = dict(confidence)
     for side in ("l", "r"):
         ear = [f"{n}_{side}" for n in EAR_MARKS if f"{n}_{side}" in out]
-        weak = sum(out[n] >= SURE and n not in mid_air for n in ear) < MOST_MARKS
+        enough = SOME_MARKS if like_ears[side] > LIKE_AN_EAR else MOST_MARKS
+        weak = sum(out[n] >= SURE and n not in mid_air for n in ear) < enough
         lids = [f"{n}_{side}" for n in ("ps", "pi", "en", "ex")]
         slit = side not in shown.shut and all(n in positions for n in lids)
         slit = slit and (shown.wide or _opening(positions, lids) < SLIT * _opening(rest, lids))
         for name in (ear if weak else []) + (lids[:2] if slit else []):
             if name in out:
                 out[name] = min(out[name], 0.9 * SURE)
+    return out
+
+
+def like_ears(space: ShapeSpace, fit: ShapeFit) -> dict[str, float]:
+    """Side -> 0..1, share that lies on the scan of the ear's skin that finds something there: hair lies about an ear."""
+    on = fit.trust * (np.abs(np.nan_to_num(fit.distance, nan=9.0)) < LIES)
+    out = {}
+    for side, sign in (("l", 1), ("r", -1)):
+        ear = (space.ear > 0.5) & (sign * space.points[:, 0] > 0) & (fit.trust > 0)
+        out[side] = float((on * space.area)[ear].sum() / max(space.area[ear].sum(), 1e-9))
     return out
 
 

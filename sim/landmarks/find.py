@@ -10,7 +10,7 @@ from ..anatomy.storage import load_head
 from ..cylindrical.second_opinion import weighed
 from ..mesh import Mesh
 from ..progress import Progress, Work, portion
-from .confidence import judge, judge_together, sure_as_corners
+from .confidence import judge, judge_together, like_ears, sure_as_corners
 from .expression import fit_expression, meeting_lids, outline_of
 from .picked import picked
 from .placed_face import place_face, run
@@ -85,5 +85,6 @@ def find_landmarks(mesh: Mesh, reference: Head | None = None, unit_scales=(1.0,)
     outline = outline_of(space, fit, target) if shown.parted else None
     if outline is not None:
         positions |= {n: p for n, p in outline.corners.items() if n in positions}
-    confidence = judge_together(positions, confidence, mid_air, reference.landmark_positions(), shown)
+    rest = reference.landmark_positions()
+    confidence = judge_together(positions, confidence, mid_air, rest, shown, like_ears(space, fit))
     return FoundLandmarks(positions, confidence, mid_air, missing, scale, misfit)
