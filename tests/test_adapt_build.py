@@ -232,6 +232,19 @@ def test_the_same_scan_moved_gives_the_same_head_moved(reference, coarse):
     np.testing.assert_allclose((other.eyes[0].centre - shift) @ turn, one.eyes[0].centre, atol=0.01)
 
 
+def test_landmarks_that_were_found_give_way_to_the_data(reference, coarse):
+    scan, marks, _ = coarse
+    off = {name: marks[name] + [0, 0, 4.0] for name in ("ac_l", "ac_r", "ch_l", "ch_r", "ls", "sn", "en_l", "en_r")}
+    target = Surface(scan.vertices, scan.triangles, smooth=2.0)
+    wrong = {}
+    for found in ((), tuple(off)):
+        fit = finish(fit_skin(reference, target, marks | off, found=found))
+        own = reference.landmarks.on({"skin": fit.fitted.vertices})
+        wrong[found] = np.mean([np.linalg.norm(own[name] - marks[name]) for name in off])
+    picked, loose = wrong.values()
+    assert loose < 0.8 * picked and picked > 1.0
+
+
 def test_four_landmarks_are_enough(reference, coarse):
     scan, marks, _ = coarse
     _, report = _fitted(reference, scan, {n: marks[n] for n in ("ex_l", "ex_r", "prn", "gn")})

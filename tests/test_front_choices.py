@@ -17,8 +17,8 @@ def asked(blender, monkeypatch):
 
     out = []
 
-    def build_head(reference, scan, landmarks, detail, relax, leave_out):
-        out.append((relax, leave_out))
+    def build_head(reference, scan, landmarks, detail, relax, leave_out, found):
+        out.append((relax, leave_out, set(found)))
         yield Progress(0.0, "Asked")
         raise InputError("That is enough.")
 
@@ -36,7 +36,7 @@ def test_choices_of_the_panel(addon, asked, reference):
         addon.context.scene.headshop.relax, addon.context.scene.headshop.leave_out = relax, leave_out
         with pytest.raises(InputError, match="enough"):
             finish(scan_objects.build(addon.context, scan))
-        assert asked.pop() == (relax.lower(), leave_out.lower())
+        assert asked.pop() == (relax.lower(), leave_out.lower(), set())
 
 
 def test_choices_on_the_command_line(asked, reference, tmp_path):
@@ -50,4 +50,29 @@ def test_choices_on_the_command_line(asked, reference, tmp_path):
     ):
         paths = [str(scan), "--landmarks", str(landmarks), "-o", str(tmp_path / "head.blend")]
         assert main(["build", "--quiet", *paths, *words]) == 2
-        assert asked.pop() == wanted
+        assert asked.pop() == (*wanted, set())
+
+
+def test_landmarks_that_nobody_placed_are_told_from_the_others(addon, asked, reference, tmp_path):
+    from headshop.headshop_addon import bridge, scan_landmarks, scan_objects
+    from headshop.sim.landmarks.find import FoundLandmarks
+
+    places = reference.landmark_positions()
+    confidence = dict.fromkeys(places, 0.8) | {"v": 0.1}
+    scan = bridge.mesh_to_object(reference.skin, "Scan")
+    addon.context.scene.collection.objects.link(scan)
+    scan_landmarks.take_found(scan, FoundLandmarks(places, confidence, ("op",), ()))
+    scan_landmarks.put(scan, "prn", places["prn"] + [0, 0, 1])
+    with pytest.raises(InputError, match="enough"):
+        finish(scan_objects.build(addon.context, scan))
+    assert asked.pop()[2] == set(places) - {"prn", "v", "op"}
+    # The same from a file of the scan's landmarks, in the window and on the command line.
+    path, mesh = tmp_path / "landmarks.json", tmp_path / "scan.ply"
+    scan_objects.save_landmarks(scan, path)
+    scan_landmarks.forget(scan)
+    scan_objects.load_landmarks(scan, path)
+    assert set(scan_landmarks.nobody_placed(scan)) == set(places) - {"prn", "v", "op"}
+    assert set(scan_landmarks.positions(scan)) == {"prn"}
+    write_ply(mesh, reference.skin)
+    assert main(["build", "--quiet", str(mesh), "--landmarks", str(path), "-o", str(tmp_path / "head.blend")]) == 2
+    assert asked.pop()[2] == set(places) - {"prn", "v", "op"}

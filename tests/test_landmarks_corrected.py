@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Corrections of found landmarks: the rest follow near by, and the most useful next one is named."""
 
+import json
+
 import numpy as np
 import pytest
 
@@ -84,3 +86,42 @@ def test_a_file_of_found_landmarks_gives_back_the_sure_ones(found, tmp_path):
     write_landmarks(tmp_path / "found.json", found.positions, found.missing, found.confidence, found.mid_air)
     assert set(read_landmarks(tmp_path / "found.json")) == set(found.sure())
     assert "op" not in found.sure() and "ch_l" in found.sure()
+
+
+def test_a_landmark_corrected_in_a_file_is_as_good_as_one_that_was_placed(found, tmp_path):
+    from headshop.sim.adapt.landmarks import read_landmark_file, write_landmarks
+
+    path = tmp_path / "found.json"
+    write_landmarks(path, found.positions, found.missing, found.confidence, found.mid_air)
+    read = read_landmark_file(path)
+    assert read.found == {n: found.confidence[n] for n in found.sure()}
+    document = json.loads(path.read_text())
+    for name in ("prn", "op"):  # the second hung in mid-air
+        document["landmarks"][name][2] += 1.5
+    path.write_text(json.dumps(document))
+    corrected = read_landmark_file(path)
+    assert set(corrected.found) == set(read.found) - {"prn"}
+    assert set(corrected.positions) == {*read.positions, "op"}
+    for broken in ({}, [], 3):  # files of before, and of anybody
+        path.write_text(json.dumps(document | {"found": broken}))
+        assert "ch_l" in read_landmark_file(path).positions
+
+
+def test_ears_of_which_few_landmarks_are_sure_count_if_the_scan_lies_like_ears(reference):
+    from headshop.sim.adapt.ears import EAR_MARKS
+    from headshop.sim.landmarks.confidence import LIKE_AN_EAR, judge_together
+    from headshop.sim.landmarks.shape_fit import REST
+    from headshop.sim.landmarks.sure import SURE
+
+    rest = reference.landmark_positions()
+    like = {"l": LIKE_AN_EAR + 0.1, "r": LIKE_AN_EAR - 0.1}
+
+    def sure(count):
+        confidence = dict.fromkeys(rest, 0.8)
+        confidence |= {f"{n}_{side}": 0.1 for side in "lr" for n in EAR_MARKS[count:]}
+        judged = judge_together(rest, confidence, (), rest, REST, like)
+        return {side: sum(judged[f"{n}_{side}"] >= SURE for n in EAR_MARKS) for side in "lr"}
+
+    assert sure(2) == {"l": 0, "r": 0}
+    assert sure(3) == {"l": 3, "r": 0}
+    assert sure(5) == {"l": 5, "r": 5}

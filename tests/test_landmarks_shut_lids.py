@@ -67,7 +67,7 @@ def test_a_head_is_built_with_the_lids_that_were_told(reference, scans, monkeypa
     marks, target = scans["l", "r"]
     fitted_to = []
 
-    def fit_skin(_, __, given, ___):
+    def fit_skin(_, __, given, *___):
         fitted_to.append(given)
         raise SeenError
         yield

@@ -104,6 +104,23 @@ def test_lids_settle_on_a_larger_eyeball(head, layout, smooth):
     assert moved[(lids == 0) & (head.groups["inner"] < 0.5)].max() == 0 and moved.max() < 2.5
 
 
+def test_lids_come_to_lie_on_the_ball_without_a_jump(head):
+    """A vertex that begins to lie between the corners of the eye is drawn to the ball the more, the farther it is in."""
+    eye = head.eyes[0]
+    contact = Rest(head).contacts["l"]
+    off = (
+        head.skin.vertices
+        - 1.5 * eye.gaze * (np.maximum(head.groups["lid_upper_l"], head.groups["lid_lower_l"]))[:, None]
+    )
+    off = head.skin.vertices + (head.skin.vertices - off)
+    gaps = []
+    for share in (0.0, 0.25, 0.5, 0.75, 1.0):
+        near = np.full(len(contact.edge), share)
+        gaps.append(clearance(contact.settled(off, eye, near)[contact.edge], eye).max())
+    assert (np.diff(gaps) < 0.01).all() and gaps[0] > gaps[-1]
+    assert max(-np.diff(gaps)) < 0.6 * (gaps[0] - gaps[-1])
+
+
 def test_the_orbit_goes_with_the_eye(head):
     eye, shift = head.eyes[0], np.array([0.4, 0.0, 1.5])
     bone = head.parts["skull"].vertices

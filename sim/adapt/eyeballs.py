@@ -19,9 +19,10 @@ if TYPE_CHECKING:
     from .rest import Rest
 
 SMALLEST, LARGEST = 9.5, 13.0  # mm: from a child of one year to a large adult eye
-LIES = (0.22, 0.94)  # along an eye from its inner corner: where the inner edge of the lids lies on the ball
-BACKS = 1  # edges behind the rim: lid backs that keep near to the ball
+#: Along an eye from its inner corner: where the inner edge of the lids lies on the ball, and over which length it begins to.
+LIES, BEGINS = (0.22, 0.94), 0.03
 EDGES = (0.08, 0.97)  # where it does on any head
+BACKS = 1  # edges behind the rim: lid backs that keep near to the ball
 CORNERS, FADE = (0.06, 1.12), 0.12  # along an eye from its inner corner: where lids lie on the ball; fading in and out
 BESIDE = (0.7, 0.35)  # how much of that holds for the seen lid one and two edges beside the rim
 CLOSE = 0.5  # share of the reference's room around the caruncle that is enough
@@ -192,8 +193,8 @@ def settled_lids(rest: "Rest", skin, eye: Eye, side: str) -> np.ndarray:
     contact, head = rest.contacts[side], rest.head
     own = rest.head.landmarks.on({"skin": skin})
     now, before = (_along(head, x[contact.edge], side, marks) for x, marks in ((skin, own), (head.skin.vertices, None)))
-    between = [(share > LIES[0]) & (share < LIES[1]) for share in (now, before)]
-    return contact.settled(skin, eye, between[0] & ~between[1])
+    within = [np.clip(np.minimum(share - LIES[0], LIES[1] - share) / BEGINS, 0, 1) for share in (now, before)]
+    return contact.settled(skin, eye, np.where(within[1] > 0, 0, within[0]))
 
 
 def _along(head: Head, points, side: str, marks=None):

@@ -85,7 +85,7 @@ class LidContact:
     def settled(self, points, eye: Eye, near=None) -> np.ndarray:
         """Skin (n, 3) mm with the lids moved as little as they must to lie on ``eye``.
 
-        near : (k,) bool, vertices of ``edge`` that must do so whatever was allowed (None: none)
+        near : (k,) 0..1, how far vertices of ``edge`` must do so whatever was allowed (None: not at all)
         """
         out = np.array(points, dtype=float)
         start = out[self.rows] - eye.centre
@@ -94,7 +94,8 @@ class LidContact:
         size = eye.radius / 12.0
         least, most = self.least * size, self.most * size
         if near is not None:
-            most[: 2 * len(self.edge)][np.tile(near, 2)] = EDGE[1] * size
+            edge, share = slice(2 * len(self.edge)), np.tile(near, 2)
+            most[edge] += share * (EDGE[1] * size - most[edge])
         move = np.zeros(len(self.rows))
         best, least_wrong = None, np.inf
         for turn in range(ROUNDS):
