@@ -35,8 +35,9 @@ UNSURE = 0.3  # mm along the surface by which sliding may miss a landmark, per m
 THICKNESS = 0.05  # weight in the last stage of how thick an ear is
 HOLD = 0.15  # weight in the last stage of a landmark picked to 1 mm, against 1 for a point of data
 #: Of landmarks that were found, not picked: factors on how far sliding may miss them, and on their weight in the last stage.
-#: Not of ears', in whose folds data alone would lead astray.
+#: Not of ears, lips and lids, in whose folds data alone would lead astray.
 FOUND_MISS, FOUND_HOLD = 6.0, 0.1
+FOLDS = (*EAR_MARKS, "ls", "li", "sto", "ch", "cph", "en", "ex", "ps", "pi")
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +112,7 @@ def _fitting(
     landmarks = complete_positions(dict(zip(names, marks, strict=True)), given)
     goal = np.array([landmarks[name] for name in names])
     known = np.array([name in given for name in names])
-    loose = np.array([name in found and name.partition("_")[0] not in EAR_MARKS for name in names])
+    loose = np.array([name in found and name.partition("_")[0] not in FOLDS for name in names])
     give = np.where(known, [PICKED * sigma(name) for name in names], CARRIED)
     rim = rims(reference)
     turn, shift = similarity(marks, goal)
