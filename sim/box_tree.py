@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Which boxes of one set overlap which of another, and which lie near points: binary trees walked level by level."""
 
-from functools import cached_property
-
 import numpy as np
 
 #: Pairs of nodes looked at in one go, and points.
@@ -21,16 +19,18 @@ class BoxTree:
         low, high = np.asarray(low, dtype=float), np.asarray(high, dtype=float)
         self.count = len(low)
         self.depth = max(int(np.ceil(np.log2(max(self.count, 1)))), 0)
+        low, high = (np.ascontiguousarray(corner.T) for corner in (low, high))
         # With its index each key is another, and sorting keys is faster than sorting indices by them.
         self.order = np.sort(morton((low + high) / 2) << 32 | np.arange(self.count)) & 0xFFFFFFFF
-        size = 1 << self.depth
         # Level d holds 2**d boxes; what the last level has too many is empty (low > high) and overlaps nothing.
-        bottom_low, bottom_high = np.full((size, 3), np.inf), np.full((size, 3), -np.inf)
-        bottom_low[: self.count], bottom_high[: self.count] = low[self.order], high[self.order]
-        self.low, self.high = [bottom_low], [bottom_high]
+        bottom = np.full((6, 1 << self.depth), -np.inf)
+        bottom[:3] = np.inf
+        bottom[:3, : self.count], bottom[3:, : self.count] = low.take(self.order, axis=1), high.take(self.order, axis=1)
+        #: Per level the corners as planes (6, k): low x, y, z and high x, y, z.
+        self.levels = [bottom]
         for _ in range(self.depth):
-            self.low.insert(0, np.minimum(self.low[0][::2], self.low[0][1::2]))
-            self.high.insert(0, np.maximum(self.high[0][::2], self.high[0][1::2]))
+            one, other = self.levels[0][:, ::2], self.levels[0][:, 1::2]
+            self.levels.insert(0, np.concatenate([np.minimum(one[:3], other[:3]), np.maximum(one[3:], other[3:])]))
 
     @classmethod
     def of(cls, vertices, triangles, margin: float = 0.0) -> "BoxTree":
@@ -39,11 +39,6 @@ class BoxTree:
         a, b, c = (planes.take(triangles[:, k], axis=1) for k in range(3))
         low, high = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
         return cls(low.T - margin, high.T + margin)
-
-    @cached_property
-    def _planes(self):
-        """Per level the corners as planes (6, k), which is what many points are compared with fastest."""
-        return [np.concatenate([low.T, high.T]) for low, high in zip(self.low, self.high, strict=True)]
 
     def near(self, points, reach):
         """Pairs of a point and a box no farther than ``reach`` (k,) mm from it: (p,) ascending and (p,).
@@ -84,7 +79,7 @@ class BoxTree:
             row = np.repeat(np.arange(start, stop), 1 << level)
             node = np.tile(np.arange(1 << level), stop - start)
             while True:
-                keep = np.flatnonzero(meets(planes, row, self._planes[level].take(node, axis=1)))
+                keep = np.flatnonzero(meets(planes, row, self.levels[level].take(node, axis=1)))
                 row, node = row[keep], node[keep]
                 if level == self.depth:
                     break
@@ -102,7 +97,8 @@ class BoxTree:
         stack = [(0, 0, np.zeros(1, dtype=np.int64), np.zeros(1, dtype=np.int64))]
         while stack:
             a, b, i, j = stack.pop()
-            meet = (self.low[a][i] <= other.high[b][j]).all(axis=1) & (other.low[b][j] <= self.high[a][i]).all(axis=1)
+            one, another = self.levels[a].take(i, axis=1), other.levels[b].take(j, axis=1)
+            meet = ((one[:3] <= another[3:]) & (another[:3] <= one[3:])).all(axis=0)
             i, j = i[meet], j[meet]
             if len(i) == 0:
                 continue
@@ -128,9 +124,8 @@ class BoxTree:
         return (np.minimum(first, second), np.maximum(first, second)) if same else (first, second)
 
 
-def morton(points):
-    """(n,) int64 for points (n, 3): the bits of x, y and z in turn, 1024 steps along the longest side."""
-    planes = np.ascontiguousarray(points.T)
+def morton(planes):
+    """(n,) int64 for points as ``planes`` (3, n): the bits of x, y and z in turn, 1024 steps along the longest side."""
     low, high = planes.min(axis=1), planes.max(axis=1)
     span = max(float((high - low).max()), 1e-12)
     cell = ((planes - low[:, None]) / span * 1023).astype(np.int64)

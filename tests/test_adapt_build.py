@@ -242,7 +242,7 @@ def test_landmarks_that_were_found_give_way_to_the_data(reference, coarse):
         own = reference.landmarks.on({"skin": fit.fitted.vertices})
         wrong[found] = np.mean([np.linalg.norm(own[name] - marks[name]) for name in off])
     picked, loose = wrong.values()
-    assert loose < 0.8 * picked and picked > 1.0
+    assert loose < 0.9 * picked and picked > 1.0
 
 
 def test_four_landmarks_are_enough(reference, coarse):

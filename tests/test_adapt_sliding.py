@@ -183,13 +183,21 @@ def rounds_of(reference):
     return fine_fit.fine_fit(skin.vertices, skin.faces, free, np.zeros(n, dtype=bool), surface, none)
 
 
-@pytest.mark.parametrize("off, more", [(0.0, -1), ((fine_fit.NEAR + fine_fit.LEFT) / 2, 0), (1.0, fine_fit.AGAIN)])
+OFFS = (
+    (0.0, -3),
+    ((fine_fit.NEAR + fine_fit.LEFT) / 2, -2),
+    (fine_fit.BEGUN, fine_fit.AGAIN - 2),
+    (1.0, fine_fit.AGAIN),
+)
+
+
+@pytest.mark.parametrize("off, more", OFFS)
 def test_there_are_as_many_rounds_as_the_skin_is_off_the_data(reference, monkeypatch, off, more):
     monkeypatch.setattr(fine_fit, "nearer", lambda base, moved, *rest: (moved, off))
     assert len(list(rounds_of(reference))) == len(fine_fit.SCHEDULE) + more
 
 
-def test_a_skin_that_is_near_takes_the_last_round_at_once(reference, monkeypatch):
+def test_a_skin_that_is_near_takes_a_single_stiff_round_and_the_last_soft_one_at_once(reference, monkeypatch):
     solve, taken = fine_fit.solve_displacement, []
 
     def noted(smooth, soft, *rest):
@@ -199,4 +207,4 @@ def test_a_skin_that_is_near_takes_the_last_round_at_once(reference, monkeypatch
     monkeypatch.setattr(fine_fit, "solve_displacement", noted)
     list(rounds_of(reference))
     softs = [soft for soft, _, _ in fine_fit.SCHEDULE]
-    assert taken == softs[:-2] + softs[-1:]
+    assert taken == [fine_fit.STIFF, softs[3], softs[-1]]

@@ -21,12 +21,12 @@ def test_skin_beyond_the_data_goes_where_its_edge_goes_and_not_along_the_slope_t
     smooth = Smoothness(vertices, quads, np.ones(n))
     pulls = RISE * x[told, None] * up
     sampling, weight = identity(n, format="csr")[told], np.ones(len(told))
-    for soft in (4.0, 0.12):
+    for soft in (4.0, 0.6, 0.12):
         smooth.factor = None
         faces, along = np.tile(up, (len(told), 1)), np.full(len(told), 0.02)
         moved = solve_displacement(smooth, soft, sampling, weight, faces, along, pulls, np.zeros((n, 3)))
         height = moved[:, 2].reshape(COLUMNS, ROWS).mean(axis=1)
         edge, end = height[TOLD - 1], height[-1]
         assert abs(height[10] - 10 * RISE) < 0.1  # on the data
-        assert 0 < end - edge < 0.4 * RISE * (COLUMNS - TOLD)  # the slope would end at all of it
+        assert 0 < end - edge < 0.1 * RISE * (COLUMNS - TOLD)  # the slope would end at all of it
         assert np.abs(np.diff(height[TOLD - 5 :], 2)).max() < 0.4 * RISE  # without a kink

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.sparse import csr_matrix
+from scipy.sparse import coo_matrix, csr_matrix
 from scipy.sparse.csgraph import connected_components
 
 from ..box_tree import BoxTree
@@ -75,7 +75,7 @@ class Surface:
     @cached_property
     def corners(self) -> np.ndarray:
         """(m, 3, 3) mm: the corners of each triangle."""
-        return self.vertices[self.triangles]
+        return self.vertices.take(self.triangles, axis=0)
 
     @cached_property
     def solid(self) -> Triangles:
@@ -92,12 +92,16 @@ class Surface:
     @cached_property
     def _sides(self):
         """Sides of the triangles, each once: vertices (e,) and (e,), and how many triangles it belongs to (e,)."""
-        a, b, c = self.triangles.T.astype(np.int64)
-        code = np.concatenate([np.minimum(u, v) << 32 | np.maximum(u, v) for u, v in ((a, b), (b, c), (c, a))])
-        code.sort()
-        start = np.flatnonzero(np.concatenate([[True], code[1:] != code[:-1]])) if len(code) else code
-        code, count = code[start], np.diff(np.append(start, len(code)))
-        return code >> 32, code & 0xFFFFFFFF, count
+        count = self._upper
+        return np.repeat(np.arange(count.shape[0]), np.diff(count.indptr)), count.indices, count.data
+
+    @cached_property
+    def _upper(self) -> csr_matrix:
+        """(n, n) sparse: to how many triangles each side belongs, in the row of the lower of its vertices."""
+        a, b, c = self.triangles.T
+        ends = [np.concatenate([end(u, v) for u, v in ((a, b), (b, c), (c, a))]) for end in (np.minimum, np.maximum)]
+        ones = np.ones(len(ends[0]), dtype=np.int32)
+        return coo_matrix((ones, tuple(ends)), shape=(len(self.vertices),) * 2).tocsr()  # sums what comes again
 
     @cached_property
     def edge_length(self) -> float:
@@ -117,8 +121,8 @@ class Surface:
     @cached_property
     def _link(self):
         """(n, n) sparse: 1 where a side joins two vertices."""
-        a, b, _ = self._sides
-        link = csr_matrix((np.ones(len(a)), (a, b)), shape=(len(self.vertices),) * 2)
+        link = self._upper
+        link = csr_matrix((np.ones(len(link.data)), link.indices, link.indptr), shape=link.shape)
         return link + link.T
 
     @cached_property
@@ -154,6 +158,7 @@ class Surface:
             "_double",
             "cover",
             "_boxes",
+            "_upper",
             "_sides",
             "edge_length",
             "border_vertex",

@@ -32,6 +32,7 @@ ALONG = 0.02  # weight of a pull along the surface against one across it
 AGREE = 0.6  # cosine between the normals of skin and scan
 WHOLE = 150.0  # mm²: a piece of data smaller than this is trusted in proportion
 FINE = 0.05  # stiffness below which data in between the cage's vertices is looked for too
+BEGUN, STIFF = 0.2, 0.6  # mm off in the mean: a skin as near as that takes a single stiff round, and how stiff that is
 NEAR = 0.045  # mm off in the mean: a skin as near as that takes the last round at once
 LEFT = 0.07  # mm by which the last round may find the skin off, in the mean
 AGAIN = 2  # times at most that it is repeated if it is farther off
@@ -98,15 +99,18 @@ def fine_fit(cage, faces, free, rim, target: Surface, anchors: Anchors, stiffnes
     moved = np.zeros((n, 3))
     for turn, step in enumerate(stiff):
         smooth.factor = None  # each is far softer than the one before
-        moved, _ = nearer(base, moved, own, tracked, anchors, smooth, step)
+        moved, off = nearer(base, moved, own, tracked, anchors, smooth, step, None if turn else (BEGUN, STIFF))
         yield (turn + 1) / turns
+        if off <= BEGUN and not turn:
+            break
     base = undrawn(faces, base + moved, base + moved)
     moved = np.zeros((n, 3))
     smooth.factor = None
     anchors = replace(anchors, sampling=(anchors.sampling @ surface.rows[:n]).tocsr())
     soft = list(rounds[len(stiff) :])
     for turn, step in enumerate(soft + soft[-1:] * AGAIN):
-        moved, off = nearer(base, moved, surface, tracked, anchors, smooth, step, soft[-1][0])
+        at_once = (NEAR, soft[-1][0]) if step[0] < LAST else None
+        moved, off = nearer(base, moved, surface, tracked, anchors, smooth, step, at_once)
         yield (len(stiff) + turn + 1) / turns
         if off <= (LEFT if turn + 1 >= len(soft) else NEAR) and step[0] < LAST:
             break
@@ -123,11 +127,13 @@ def fine_fit(cage, faces, free, rim, target: Surface, anchors: Anchors, stiffnes
     return Fitted(cage, vertices, trust, gap)
 
 
-def nearer(base, moved, surface: DrawnPoints, tracked: Tracked, anchors: Anchors, smooth: Smoothness, step, end=None):
+def nearer(
+    base, moved, surface: DrawnPoints, tracked: Tracked, anchors: Anchors, smooth: Smoothness, step, instead=None
+):
     """One round, from the displacement ``moved`` (n, 3) of ``base`` (n, 3), of which ``surface`` is made, to the next.
 
-    step : of the schedule; ``end`` : stiffness of its last round, taken at once where the skin is `NEAR` and rims look for
-    data. Surroundings of folds are made stiffer in ``smooth``. Returns the displacement (n, 3) mm, and how far off the data
+    step : of the schedule; instead : how far off the skin may be, mm in the mean, to be moved with another stiffness, and
+    which. Surroundings of folds are made stiffer in ``smooth``. Returns the displacement (n, 3) mm, and how far off the data
     the skin was before, across it, in the mean, mm.
     """
     soft, reach, width = step
@@ -145,8 +151,8 @@ def nearer(base, moved, surface: DrawnPoints, tracked: Tracked, anchors: Anchors
     height = np.einsum("ij,ij->i", gap, facing)
     robust = trust[use] / (1 + (height / width) ** 2) ** 2
     off = float(robust @ np.abs(height)) / max(float(robust.sum()), 1e-12)
-    if end is not None and soft < LAST and off <= NEAR:
-        soft = end
+    if instead is not None and off <= instead[0]:
+        soft = instead[1]
     rows, k = surface.rows[look[use]], len(anchors.weight)
     # A point is pulled along the normal, and a little along the surface; an anchor every way.
     facing, along = np.concatenate([facing, np.zeros((k, 3))]), np.append(np.full(len(use), ALONG), np.ones(k))
@@ -155,7 +161,7 @@ def nearer(base, moved, surface: DrawnPoints, tracked: Tracked, anchors: Anchors
     pulls = facing * np.einsum("ij,ij->i", facing, goal)[:, None] + along[:, None] * goal
     sampling = vstack([rows, anchors.sampling]).tocsr()
     pulls *= weight[:, None]
-    left = SOLVED if soft == end else ROUGHLY
+    left = SOLVED if soft == SCHEDULE[-1][0] else ROUGHLY
     moved = solve_displacement(smooth, soft, sampling, weight, facing, along, pulls, moved, left)
     worse = folded(surface.rows @ base, surface.rows @ (base + moved), surface.triangles)
     if worse.any():

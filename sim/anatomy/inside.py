@@ -57,7 +57,7 @@ def inside(points, vertices, triangles) -> np.ndarray:
 
 def _with_dipoles(points, corner):
     """(k,) the winding number of triangles (m, 3, 3) mm, near groups exactly and far ones as dipoles."""
-    order = np.argsort(morton(corner.mean(axis=1)), kind="stable")
+    order = np.argsort(morton(corner.mean(axis=1).T), kind="stable")
     pad = -len(order) % GROUP
     order = np.concatenate([order, np.full(pad, order[-1])])
     corner = corner[order].reshape(-1, GROUP, 3, 3)
