@@ -6,7 +6,9 @@ import pytest
 
 from headshop.sim.adapt.closest import Surface
 from headshop.sim.adapt.follow import follow
+from headshop.sim.adapt.nostril_walls import DEEP, within_bone
 from headshop.sim.adapt.rest import rest_of
+from headshop.sim.adapt.skin_cover import signed_depth
 from headshop.sim.adapt.vestibules import vestibules
 from headshop.sim.mesh_piercing import self_piercings
 from headshop.sim.mesh_subdivision import drawn
@@ -61,3 +63,25 @@ def test_data_within_bounds_a_nostril(reference, rest):
     free, bound = (vestibules(rest, skin, _scan(rest, offset)) for offset in (None, 6.0))
     rows = rest.organs["nostrils"]
     assert np.linalg.norm(bound[rows], axis=1).mean() < 0.7 * np.linalg.norm(free[rows], axis=1).mean()
+
+
+def test_passages_that_lead_into_bone_narrow_so_that_bone_keeps_its_shape(reference, rest):
+    skin, skull, rows = reference.skin.vertices, reference.parts["skull"], rest.organs["nostrils"]
+    moved = vestibules(rest, skin, _scan(rest))
+    usual = within_bone(rest, skin + moved, skull)
+    np.testing.assert_array_equal(np.delete(usual, rows, axis=0), np.delete(skin, rows, axis=0))
+    assert np.linalg.norm(usual - skin - moved, axis=1)[rows].mean() < 0.5
+    wide = np.array(moved)
+    back = rows[rest.behind[rows] > 1]
+    wide[back] += [0, 6.0, 0] + np.sign(skin[back, :1]) * [5.0, 0, 0]
+    in_bone = [
+        signed_depth(at, Surface(skull.vertices, skull.triangles), 20.0, skull)[0].max()
+        for at in ((skin + wide)[rows], within_bone(rest, skin + wide, skull)[rows])
+    ]
+    assert in_bone[0] > 2.0 and in_bone[1] <= DEEP
+    before = len(self_piercings(skull.vertices, skull.triangles))
+    done = finish(follow(reference, skin, None, wide))
+    bone = done.head.parts["skull"]
+    near = np.linalg.norm(bone.vertices - skull.vertices, axis=1)
+    assert near.max() < 3.0
+    assert len(self_piercings(bone.vertices, bone.triangles)) <= before + 4

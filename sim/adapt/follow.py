@@ -19,6 +19,7 @@ from .bone_inside import keeping_inside
 from .lining import lined, lips_met, lips_parted
 from .mouth import mouth_similarity, with_teeth
 from .muscles import carried_muscles
+from .nostril_walls import within_bone
 from .rest import BONES, TEETH, Rest, rest_of
 from .skin_cover import SkinCover
 from .skin_groups import group
@@ -84,7 +85,8 @@ def follow(
     final = lips_met(rest, final, size)
     for organ in rest.organs:
         final = lined(rest, final, organ, carried.get(organ))
-    final = final if nostrils is None else final + nostrils
+    if nostrils is not None:
+        final = within_bone(rest, final + nostrils, reference.parts["skull"].moved(parts["skull"]))
     final = lips_met(rest, final, size)
     for eye, side in zip(eyes, "lr", strict=True):
         final = eyeballs.lids_on_eye(rest, final, eye, side)
