@@ -8,15 +8,16 @@ from headshop.sim.adapt.closest import Surface
 from headshop.sim.adapt.landmarks import read_landmarks
 from headshop.sim.adapt.shut_eyes import with_shut_eyes
 from headshop.sim.anatomy.landmark_names import SKIN, mirrored
+from headshop.sim.landmarks import placed_face
 from headshop.sim.landmarks.expression import HOLED, holes_in_eyes
 from headshop.sim.landmarks.find import find_landmarks
 from headshop.sim.landmarks.pose_search import Pose
 from headshop.sim.landmarks.shape_fit import ShapeFit
 from headshop.sim.landmarks.shape_space import shape_space
-from headshop.sim.landmarks.verdict import judged
+from headshop.sim.landmarks.verdict import Verdict, judged
 from headshop.sim.mesh import Mesh
 from headshop.sim.mesh_subdivision import drawn
-from headshop.sim.progress import finish
+from headshop.sim.progress import Progress, finish
 from headshop.sim.scan.clean import clean_scan
 from headshop.sim.scan.individual import draw_field
 from headshop.sim.scan.ply import read_ply
@@ -127,3 +128,29 @@ def test_of_two_places_a_face_fits_as_well_the_likelier_shape_is_better(referenc
     usual, odd = bad(np.full(m, 0.5)), bad(np.full(m, 1.5))
     assert usual.likeness == odd.likeness and not usual.doubtful and not odd.doubtful
     assert odd.bad > 2 * usual.bad
+
+
+@pytest.mark.parametrize(
+    "second, expected", [(Verdict(False, 18.0, 0.73), "second"), (Verdict(True, 30.0, 0.6), "first")]
+)
+@pytest.mark.parametrize("first, looks", [(Verdict(False, 53.0, 0.56), 2), (Verdict(False, 10.0, 0.8), 1)])
+def test_a_place_hardly_like_a_face_is_taken_only_if_a_thorough_look_finds_no_better(
+    reference, monkeypatch, first, looks, second, expected
+):
+    taken = []
+
+    def trials(look, *rest):
+        taken.append(look)
+        yield Progress(0.5, "")
+        return [(1.0, 1.0, None, None)]
+
+    def fits(look, *rest):
+        yield Progress(0.5, "")
+        return [(first, 1.0, "first", None)] if look is placed_face.LOOKS[0] else [(second, 1.0, "second", None)]
+
+    monkeypatch.setattr(placed_face, "_trials", trials)
+    monkeypatch.setattr(placed_face, "_fits", fits)
+    scan = reference.skin
+    _, fit, _ = finish(placed_face.place_face(scan, reference, shape_space(reference), (1.0,)))
+    assert len(taken) == looks
+    assert fit == (expected if looks == 2 else "first")

@@ -51,9 +51,10 @@ class Look:
     relief: float
 
 
-#: The second is taken if the first shows no face: a thorough one, which begins with a small face, because a large one on a
-#: small head finds no hold.
+#: The second is taken if the first shows no plain face: a thorough one, which begins with a small face, because a large one
+#: on a small head finds no hold.
 LOOKS = (Look(1.0, STARTS, SURVIVORS, 10, 3, 1.25, 5, 2, 0.53), Look(0.8, 1000, 400, 14, 4, np.inf, 4, 4, 0.7))
+PLAIN = 0.66  # relief from which on a first look is enough: faces have as much
 CLEAR = 0.75  # relief from which on nothing better is looked for
 TURNS = 3  # times that a fit is begun again
 
@@ -79,7 +80,7 @@ def place_face(mesh: Mesh, reference: Head, space: ShapeSpace, unit_scales) -> W
         results += yield from portion(_fits(look, reference, space, few, rivals, good), middle, high)
         if results:
             verdict, scale, fit, target = min(results, key=lambda t: t[0])
-            if not verdict.doubtful:
+            if not verdict.doubtful and (verdict.likeness > PLAIN or look is LOOKS[-1]):
                 return scale, fit, target
     raise InputError(NO_FACE)
 
