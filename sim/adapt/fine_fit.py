@@ -77,7 +77,7 @@ def matches(rows, points, normals, tracked: Tracked, reach: float):
     return found, trust
 
 
-def fine_fit(cage, faces, free, rim, target: Surface, anchors: Anchors, stiffness=None, rounds=SCHEDULE):
+def fine_fit(cage, faces, free, rim, target: Surface, anchors: Anchors, stiffness=None):
     """A generator: yields the fraction done, returns `Fitted`.
 
     Parameters
@@ -88,14 +88,14 @@ def fine_fit(cage, faces, free, rim, target: Surface, anchors: Anchors, stiffnes
     rim (n,) bool : vertices that look for data in the last rounds only, and only close by (margins of lips and lids)
     stiffness (n,) : factor on the bending stiffness of each vertex (1 everywhere by default)
     """
-    n, turns = len(cage), len(rounds) + AGAIN
+    n, turns = len(cage), len(SCHEDULE) + AGAIN
     base = drawn(faces, np.asarray(cage, dtype=float))
     smooth = Smoothness(base, faces, np.ones(n) if stiffness is None else stiffness)
     surface = drawn_points(faces, free, free | rim)
     tracked = Tracked(target, surface.rows.shape[0])
     # While the skin is stiff, the drawn surface's own vertices stand for all of it: a small system.
     own = own_points(faces, free, free | rim)
-    stiff = [step for step in rounds if step[0] >= FINE]
+    stiff = [step for step in SCHEDULE if step[0] >= FINE]
     moved = np.zeros((n, 3))
     for turn, step in enumerate(stiff):
         smooth.factor = None  # each is far softer than the one before
@@ -107,7 +107,7 @@ def fine_fit(cage, faces, free, rim, target: Surface, anchors: Anchors, stiffnes
     moved = np.zeros((n, 3))
     smooth.factor = None
     anchors = replace(anchors, sampling=(anchors.sampling @ surface.rows[:n]).tocsr())
-    soft = list(rounds[len(stiff) :])
+    soft = list(SCHEDULE[len(stiff) :])
     for turn, step in enumerate(soft + soft[-1:] * AGAIN):
         at_once = (NEAR, soft[-1][0]) if step[0] < LAST else None
         moved, off = nearer(base, moved, surface, tracked, anchors, smooth, step, at_once)

@@ -27,11 +27,8 @@ def within_bone(rest: Rest, skin: np.ndarray, skull: Mesh) -> np.ndarray:
     """(n, 3) mm: ``skin`` (n, 3) mm with the linings of its nostrils out of the ``skull``, but for `DEEP`, as far as they can
     be narrowed."""
     out = np.array(skin, dtype=float)
-    left = rest.head.skin.vertices[:, 0] > 0
-    for side in (left, ~left):
-        rows = rest.organs["nostrils"][side[rest.organs["nostrils"]]]
-        if len(rows):
-            out[rows] = _narrowed(rest, rows, out, skull)
+    for rows in rest.nostrils:
+        out[rows] = _narrowed(rest, rows, out, skull)
     return out
 
 
@@ -48,7 +45,8 @@ def _narrowed(rest: Rest, rows, skin, skull: Mesh):
     middle = np.array([start[behind == step].mean(axis=0) for step in steps])
     way = middle[0] + np.linspace(1, 0, PLACES)[:, None, None] * (middle - middle[0])
     free = signed_depth(way.reshape(-1, 3), surface, AROUND, skull)[0].reshape(way.shape[:2]) < -FREE
-    middle = way[free.argmax(axis=0), np.arange(len(steps))][ring]
+    ends = np.where(free.any(axis=0), free.argmax(axis=0), PLACES - 1)
+    middle = way[ends, np.arange(len(steps))][ring]
     touched = abs(places[:, rows]).T
     share = np.zeros(len(rows))
     while True:

@@ -108,6 +108,13 @@ class Rest:
         return np.maximum(group(self.head, f"lid_upper_{side}"), group(self.head, f"lid_lower_{side}"))
 
     @cached_property
+    def nostrils(self) -> tuple[np.ndarray, ...]:
+        """The rows of the lining of each nostril, left and right; none where the skin has no such lining."""
+        rows = self.organs["nostrils"]
+        left = self.head.skin.vertices[rows, 0] > 0
+        return tuple(side for side in (rows[left], rows[~left]) if len(side))
+
+    @cached_property
     def contacts(self) -> dict[str, LidContact]:
         """Side -> how the lids of that eye are brought to lie on an eyeball."""
         return {side: lid_contact(self, side) for side in "lr"}

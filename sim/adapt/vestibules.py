@@ -34,11 +34,8 @@ def vestibules(rest: Rest, skin: np.ndarray, target: Surface) -> np.ndarray:
     rest : the reference; skin (n, 3) mm : its skin as fitted to the scan ``target``
     """
     out = np.zeros_like(skin)
-    left = rest.head.skin.vertices[:, 0] > 0
-    for side in (left, ~left):
-        rows = rest.organs["nostrils"][side[rest.organs["nostrils"]]]
-        if len(rows):
-            out[rows] = _moved(rest, rows, skin, target)
+    for rows in rest.nostrils:
+        out[rows] = _moved(rest, rows, skin, target)
     return out
 
 
