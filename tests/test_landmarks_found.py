@@ -4,12 +4,9 @@
 import numpy as np
 import pytest
 
-from headshop.sim.adapt.closest import Surface
 from headshop.sim.adapt.landmarks import read_landmarks
-from headshop.sim.adapt.shut_eyes import with_shut_eyes
 from headshop.sim.anatomy.landmark_names import SKIN, mirrored
 from headshop.sim.landmarks import placed_face
-from headshop.sim.landmarks.expression import HOLED, holes_in_eyes
 from headshop.sim.landmarks.find import find_landmarks
 from headshop.sim.landmarks.pose_search import Pose
 from headshop.sim.landmarks.shape_fit import ShapeFit
@@ -90,15 +87,6 @@ def test_a_small_head_cut_off_above_the_brows_is_found_in_any_turn(reference, sh
     off = {n: np.linalg.norm(found.positions[n] - (turn @ p + shift)) for n, p in true.items() if n in found.positions}
     assert np.mean(list(off.values())) < 6.0
     assert np.mean([off[n] for n in FACE if n in off]) < 4.0
-
-
-def test_open_eyes_have_holes_and_shut_ones_none(reference):
-    for sides, holed in (((), True), (("l", "r"), False)):
-        head = with_shut_eyes(reference, sides)
-        seen = (head.groups["inner"] < 0.5)[head.skin.triangles].all(axis=1)
-        target = Surface(drawn(head.skin.faces, head.skin.vertices), head.skin.triangles[seen])
-        found = holes_in_eyes(head.landmark_positions(), np.eye(3), target)
-        assert (found > HOLED) == holed
 
 
 def test_eyes_with_holes_are_open_though_their_lids_have_lost_their_edges(reference):

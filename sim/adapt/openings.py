@@ -68,7 +68,7 @@ def _eye_frame(en, ex, up):
     return np.stack([along, upward, np.cross(along, upward)])
 
 
-def lid_margins(reference: Head, rim, given, matrix, closed=()):
+def lid_margins(reference: Head, rim, given, matrix, closed=(), lines=None):
     """Where the margins of the lids belong: extra landmarks on the rims of both eyes.
 
     A squinting or closed eye keeps the shape of its margins, lower or higher, so each is scaled to pass the height of
@@ -76,8 +76,10 @@ def lid_margins(reference: Head, rim, given, matrix, closed=()):
     pinch the lid there.
 
     matrix (3, 3) turns the reference into the scan's place; closed: sides of closed eyes, whose margins both pass midway
-    between the two. Returns vertices (k,), targets (k, 3), and 0..1 (k,): 1 in an eye that is half or twice as open as
-    the reference's, or more unlike it, 0 in one as open.
+    between the two; lines: side -> `LidLine` with which those rise and fall, or None.
+
+    Returns vertices (k,), targets (k, 3), and 0..1 (k,): 1 in an eye that is half or twice as open as the reference's, or
+    more unlike it, 0 in one as open.
     """
     v, rest = reference.skin.vertices, reference.landmark_positions()
     rows, targets, changes = [], [], []
@@ -99,6 +101,7 @@ def lid_margins(reference: Head, rim, given, matrix, closed=()):
             local = (v[margin] - start) @ old.T
             order = np.argsort(local[:, 0], kind="stable")
             margin, local = margin[order], local[order]
+            heights = local[:, 1].copy()
             at = np.mean([given[f"{x}_{side}"] for x in ("pi", "ps")], axis=0) if side in closed else given[mark]
             picked = (at - goal) @ new.T / scale
             here = [np.interp(picked[0], local[:, 0], local[:, k]) for k in (1, 2)]
@@ -108,12 +111,26 @@ def lid_margins(reference: Head, rim, given, matrix, closed=()):
             lift = ((picked[1] - here[0]) / share, np.clip((picked[2] - here[1]) / share, -4, 4))
             local[:, 1] += bulge * lift[0]
             local[:, 2] += bulge * lift[1]
+            line = (lines or {}).get(side)
+            if line is not None:
+                crease = (line.at(local[:, 0] / length) - goal) @ new[1] / scale
+                local[:, 1] = crease + heights - _seam(reference, rim, side, start, old, local[:, 0])
             rows.append(margin)
             targets.append(goal + scale * local @ new)
             changes.append(np.full(len(margin), change))
     if not rows:
         return np.zeros(0, dtype=int), np.zeros((0, 3)), np.zeros(0)
     return np.concatenate(rows), np.concatenate(targets), np.concatenate(changes)
+
+
+def _seam(reference, rim, side, start, frame, along):
+    """Height (k,) mm, ``along`` (k,) mm the eye in its ``frame``, midway between the margins of its lids."""
+    height = np.zeros(len(along))
+    for lid in ("upper", "lower"):
+        local = (reference.skin.vertices[_rim_of(reference, rim, f"lid_{lid}_{side}")] - start) @ frame.T
+        order = np.argsort(local[:, 0], kind="stable")
+        height += np.interp(along, local[order, 0], local[order, 1]) / 2
+    return height
 
 
 def opening(positions, side: str) -> float:

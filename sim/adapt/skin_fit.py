@@ -17,6 +17,7 @@ from .closest import Surface
 from .completion import complete_positions, mirror_plane, sigma
 from .ears import EAR_MARKS, ear_sheets, unseen_ears
 from .fine_fit import Anchors, Fitted, fine_fit
+from .lid_line import met_at
 from .openings import closed_eyes, lid_margins, offset_anchors, rim_anchors, rims
 from .refine import Pairs, refine
 from .shut_eyes import with_shut_eyes
@@ -116,7 +117,8 @@ def _fitting(
     give = np.where(known, [PICKED * sigma(name) for name in names], CARRIED)
     rim = rims(reference)
     turn, shift = similarity(marks, goal)
-    margin, margin_goal, change = lid_margins(reference, rim, given, turn, closed)
+    lines = {side: met_at(given, side, target, turn) for side in closed}
+    margin, margin_goal, change = lid_margins(reference, rim, given, turn, closed, lines)
     pinched = change.max(initial=0.0)
     give[np.isin(names, LID_MARKS) & known] += CARRIED * pinched
     margin, margin_goal = np.concatenate([margin, lips[0]]), np.concatenate([margin_goal, lips[1]])

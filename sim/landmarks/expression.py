@@ -5,7 +5,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..adapt.closest import Surface
-from ..relax.mouth_gap import depths, lip_edges
+from ..relax.mouth_gap import lip_edges
+from .eye_gaps import gaps_in_eyes
+from .lid_creases import lid_lines, shut_by_creases, told_of_lids
 from .mouth_outline import MouthOutline, mouth_outline
 from .shape_fit import CHANGE, Expression, ShapeFit, Told, fit_shape
 from .shape_space import ShapeSpace
@@ -16,14 +18,10 @@ AROUND_MOUTH = 35.0  # mm
 SHUT = 0.6  # eyes shut this far though they were taken for open are shut: a broad smile shuts them by 0.4
 REASON = 0.95  # shut eyes must fit that much better
 LOOKED = np.linspace(-0.28, 0.28, 9)  # shares of the way from the middle of the mouth to its corners
-#: Shares of the way along an eye at which it is looked over, mm above and below, places looked at; mm of a hole, and the
-#: share of lines with one from which on the eyes are open.
-EYE_LINES, ACROSS, LINE = np.linspace(0.25, 0.75, 11), 9.0, 60
-HOLE, HOLED = 1.2, 0.3
-HOLED_SHUT = 0.45  # the same of eyes that the skin says are shut: lashes have holes as well
-#: Eyes that are open, as their holes tell, and shut farther than this were misread: the holes take the lids' edges with them,
+#: Eyes that are open, as their gaps tell, and shut farther than this were misread: the gaps take the lids' edges with them,
 #: and nothing else holds the lids up.
 DROOPED = 0.15
+WIDE = -0.2  # eyes that fit so much wider open than the reference's are not seen to be shut: the fit is off there
 #: mm on a head of the reference's size between the edges of lips that are parted: noise parts closed lips by 2.9, a tube
 #: between them by 6, a smile with teeth by 12.
 APART = 4.0
@@ -36,29 +34,41 @@ FEW = 25  # percent of them at which lips that are parted may seem closed: noise
 def fit_expression(space: ShapeSpace, target: Surface, fit: ShapeFit):
     """A generator: yields the fraction done, returns the `ShapeFit` and the `Expression` that the scan shows."""
     moved = fit.coefficients + space.parted
-    free = yield from _third(fit_shape(space, target, fit.pose, CHANGE, moved, 1, Expression(True)), 0)
+    free = yield from _part(fit_shape(space, target, fit.pose, CHANGE, moved, 1, Expression(True)), 0)
     outline = outline_of(space, free, target)
     told = None if outline is None else told_of_mouth(space, outline)
     if told is not None:
         work = fit_shape(space, target, free.pose, CHANGE, free.coefficients, 1, Expression(True), told)
-        free = yield from _third(work, 1)
+        free = yield from _part(work, 1)
     gap = told is not None or lips_ajar(space, free, target)
     mouth = about_mouth(space)
     parted = gap and cost(space, free, mouth) < NO_WORSE * cost(space, fit, mouth)
     fit, told = (free, told) if parted else (fit, None)
-    holes = holes_in_eyes(space.landmarks(fit.points), fit.matrix, target)
-    if holes < HOLED_SHUT and min(shut_share(space, fit).values()) > SHUT:
-        return fit, Expression(parted, ("l", "r"))
-    shut = Expression(parted, ("l", "r"))
-    moved = fit.coefficients + space.shut["l"] + space.shut["r"]
-    rival = yield from _third(fit_shape(space, target, fit.pose, CHANGE, moved, 1, shut, told), 2)
-    about = eyes(space)
-    if holes < HOLED and cost(space, rival, about) < REASON * cost(space, fit, about):
-        return rival, shut
-    if holes >= HOLED and max(shut_share(space, fit).values()) > DROOPED:
+    shut = shut_by_sight(space, fit, target)
+    if shut is False:
+        if max(shut_share(space, fit).values()) <= DROOPED:
+            return fit, Expression(parted)
         wide = Expression(parted, wide=True)
-        return (yield from _third(fit_shape(space, target, fit.pose, CHANGE, fit.coefficients, 1, wide, told), 2)), wide
-    return fit, Expression(parted)
+        return (yield from _part(fit_shape(space, target, fit.pose, CHANGE, fit.coefficients, 1, wide, told), 2)), wide
+    both = Expression(parted, ("l", "r"))
+    moved = fit.coefficients + sum((1 - share) * space.shut[side] for side, share in shut_share(space, fit).items())
+    if shut:
+        lids = told_of_lids(space, fit, lid_lines(space, fit, target))
+        told = lids if told is None else told.and_of(lids)
+    rival = yield from _part(fit_shape(space, target, fit.pose, CHANGE, moved, 1, both, told), 2)
+    if shut or min(shut_share(space, fit).values()) > SHUT:
+        return rival, both
+    about = eyes(space)
+    return (rival, both) if cost(space, rival, about) < REASON * cost(space, fit, about) else (fit, Expression(parted))
+
+
+def shut_by_sight(space: ShapeSpace, fit: ShapeFit, target: Surface) -> bool | None:
+    """Whether the eyes are seen to be shut: by what the scan lacks there, or else by its creases; None: that is not seen."""
+    gaps = gaps_in_eyes(space.landmarks(fit.points), fit.matrix, target)
+    if gaps.show_open or gaps.show_shut:
+        return gaps.show_shut
+    shut = shut_by_creases(lid_lines(space, fit, target))
+    return None if shut and np.mean(list(shut_share(space, fit).values())) < WIDE else shut
 
 
 def shut_share(space: ShapeSpace, fit: ShapeFit) -> dict[str, float]:
@@ -81,13 +91,13 @@ def told_of_mouth(space: ShapeSpace, outline: MouthOutline) -> Told:
     return Told(corners, weights, np.array([*outline.corners.values(), outline.upper, outline.lower]))
 
 
-def _third(work, before):
+def _part(work, before, of=3):
     while True:
         try:
             done = next(work)
         except StopIteration as end:
             return end.value
-        yield (before + done) / 3
+        yield (before + done) / of
 
 
 def lips_ajar(space: ShapeSpace, free: ShapeFit, target: Surface) -> bool:
@@ -101,26 +111,6 @@ def lips_ajar(space: ShapeSpace, free: ShapeFit, target: Surface) -> bool:
     edges = lip_edges(target, space.landmarks(free.points), forward, LOOKED)
     apart = np.nan_to_num(np.linalg.norm(edges[:, 0] - edges[:, 1], axis=1))
     return bool(np.percentile(apart, FEW) > APART * free.pose.scale and np.median(apart) < FAR_APART * free.pose.scale)
-
-
-def holes_in_eyes(marks, matrix, target: Surface) -> float:
-    """Share of the lines from above to below both eyes on which the scan has a hole: shut lids are skin, but of an open eye
-    scanners lose the iris and what lies in the lids' shade.
-
-    marks : name -> (3,) mm in the scan; matrix (3, 3) turns and scales the reference into it
-    """
-    heights = np.linspace(ACROSS, -ACROSS, LINE)
-    lines = []
-    for side in "lr":
-        inner, outer = marks[f"en_{side}"], marks[f"ex_{side}"]
-        along = inner + EYE_LINES[:, None] * (outer - inner)
-        lines.append(along[:, None] + heights[:, None] * matrix[:, 2])
-    lines = np.concatenate(lines)
-    forward = -matrix[:, 1] / np.linalg.norm(matrix[:, 1])
-    empty = np.isnan(depths(target, lines.reshape(-1, 3), forward)).reshape(len(lines), LINE)
-    long = int(np.ceil(HOLE / (2 * ACROSS / (LINE - 1))))
-    runs = np.cumsum(np.pad(empty, ((0, 0), (1, 0))), axis=1)
-    return float((runs[:, long:] - runs[:, :-long] == long).any(axis=1).mean())
 
 
 def meeting_lids(space: ShapeSpace, fit: ShapeFit, target: Surface, shut) -> dict[str, np.ndarray]:

@@ -62,6 +62,11 @@ class Told:
     weights: np.ndarray
     places: np.ndarray
 
+    def and_of(self, other: "Told") -> "Told":
+        """Both together."""
+        pairs = ((getattr(self, name), getattr(other, name)) for name in ("corners", "weights", "places"))
+        return Told(*(np.concatenate(pair) for pair in pairs))
+
 
 @dataclass(frozen=True, eq=False)
 class ShapeFit:
@@ -147,8 +152,10 @@ def fit_shape(
         pull[7:] += prior[7:] * usual
         if not expression.parted:
             system[7:, 7:] += space.seal
-        if expression.wide:
-            system[7:, 7:] += space.wide
+        for side, form in space.lids.items():
+            if expression.wide or side in expression.shut:
+                system[7:, 7:] += form
+                pull[7:] += form @ space.shut[side] * (side in expression.shut)
         step = np.linalg.solve(system, pull)
         coefficients = step[7:]
         grow = 1 + np.clip(step[6], -0.1, 0.1)

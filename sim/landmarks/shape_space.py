@@ -25,7 +25,7 @@ LEAST = 0.1  # mm: root mean square over the skin of a mode that counts
 TOUCH = 2.0  # mm: lips nearer than this touch at rest
 SEAL, LIPS = 0.8, 8.0  # mm that closed lips may part, one standard deviation, at so many places of their own
 SHUT = 0.7  # how far an eye is shut, one standard deviation
-LEFT_OPEN = 0.1  # how far an eye is shut that is wide open, one standard deviation
+HELD = 0.1  # how far an eye is shut of which it is known whether it is, one standard deviation
 OPENED = 1.2  # standard deviations of the jaw by which a mouth is open that is open at all
 JAW_OPEN = 0.12  # rad, one standard deviation
 #: A smile moves the corners of the mouth outward, back and up, mm; one standard deviation.
@@ -41,7 +41,7 @@ class ShapeSpace:
     modes (n, 3, m) mm : displacement for one standard deviation of each coefficient
     seal (m, m) : quadratic form of lips that part, in standard deviations: small where the mouth is closed
     shut : side -> (m,) coefficients that shut that eye
-    wide (m, m) : quadratic form of eyes that are not as open as the reference's, small where they are
+    lids : side -> (m, m), quadratic form of how far that eye is shut
     parted (m,) : coefficients that open the mouth
     lips : points of the upper lip, and of the lower lip that they touch
     triangles (t, 3) : of the points
@@ -55,7 +55,7 @@ class ShapeSpace:
     modes: np.ndarray
     seal: np.ndarray
     shut: dict[str, np.ndarray]
-    wide: np.ndarray
+    lids: dict[str, np.ndarray]
     parted: np.ndarray
     lips: tuple[np.ndarray, np.ndarray]
     triangles: np.ndarray
@@ -73,12 +73,13 @@ class ShapeSpace:
     def reduced(self, count: int) -> "ShapeSpace":
         """The same skin with its first ``count`` modes only."""
         shut = {side: vector[:count] for side, vector in self.shut.items()}
+        lids = {side: form[:count, :count] for side, form in self.lids.items()}
         return replace(
             self,
             modes=self.modes[:, :, :count],
             seal=self.seal[:count, :count],
             shut=shut,
-            wide=self.wide[:count, :count],
+            lids=lids,
             parted=self.parted[:count],
         )
 
@@ -125,7 +126,7 @@ def shape_space(head: Head) -> ShapeSpace:
         modes,
         apart.T @ apart / (SEAL**2 * len(upper) / LIPS),
         shut,
-        sum(np.outer(way, way) / (way @ way) ** 2 for way in shut.values()) / LEFT_OPEN**2,
+        {side: np.outer(way, way) / (way @ way) ** 2 / HELD**2 for side, way in shut.items()},
         parted,
         (upper, lower),
         triangles,

@@ -1,0 +1,190 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Whether eyes are open or shut is seen on the scan: by what it lacks there, and by the creases along the lids."""
+
+import numpy as np
+import pytest
+
+from headshop.sim.adapt.closest import Surface
+from headshop.sim.adapt.lid_line import COLUMNS, MIDDLE, best_way, crease, lid_line, met_at
+from headshop.sim.adapt.openings import lid_margins, rims
+from headshop.sim.adapt.shut_eyes import with_shut_eyes
+from headshop.sim.landmarks.expression import fit_expression
+from headshop.sim.landmarks.eye_gaps import EyeGaps, crevices, gaps_in_eyes
+from headshop.sim.landmarks.lid_creases import shut_by_creases, told_of_lids
+from headshop.sim.landmarks.pose_search import Pose
+from headshop.sim.landmarks.shape_fit import fit_shape
+from headshop.sim.landmarks.shape_space import shape_space
+from headshop.sim.mesh_subdivision import drawn
+
+BOTH = ("l", "r")
+HERE = Pose(1.0, np.eye(3), np.zeros(3), 0.0)
+
+
+def drain(work):
+    """What the generator ``work`` returns."""
+    while True:
+        try:
+            next(work)
+        except StopIteration as end:
+            return end.value
+
+
+def scanned(reference, sides, without=lambda middle, marks: np.zeros(len(middle), dtype=bool)):
+    """The skin seen from outside, the eyes on ``sides`` shut, ``without`` the triangles of such a middle, and landmarks."""
+    head = with_shut_eyes(reference, sides)
+    marks, skin = head.landmark_positions(), drawn(head.skin.faces, head.skin.vertices)
+    seen = (head.groups["inner"] < 0.5)[head.skin.triangles].all(axis=1)
+    seen &= ~without(skin[head.skin.triangles].mean(axis=1), marks)
+    return Surface(skin, head.skin.triangles[seen], smooth=2.0), marks
+
+
+def slit(middle, marks):
+    """Triangles along the line where the lids meet, which a scanner loses."""
+    out = np.zeros(len(middle), dtype=bool)
+    for side in BOTH:
+        met, (inner, outer) = (
+            (marks[f"ps_{side}"] + marks[f"pi_{side}"]) / 2,
+            (marks[f"{c}_{side}"] for c in ("en", "ex")),
+        )
+        share = (middle - inner) @ (outer - inner) / ((outer - inner) @ (outer - inner))
+        sag = (met - (inner + outer) / 2)[2] * 4 * share * (1 - share)
+        height = (inner + share[:, None] * (outer - inner))[:, 2] + sag
+        out |= (np.abs(middle[:, 2] - height) < 0.9) & (share > 0) & (share < 1) & (middle[:, 1] < met[1] + 15)
+    return out
+
+
+def test_an_open_eye_gapes_and_a_shut_one_does_not(reference):
+    for sides in ((), BOTH):
+        target, marks = scanned(reference, sides)
+        assert gaps_in_eyes(marks, np.eye(3), target).show_open == (not sides)
+
+
+def test_the_bottom_of_an_empty_socket_is_no_eye(reference):
+    """Made heads without eyeballs show their sockets, so no hole; the eyes are open all the same."""
+    skin, marks = reference.skin, reference.landmark_positions()
+    middle = np.mean([marks[f"{name}_{side}"] for name in ("en", "ex") for side in BOTH], axis=0)
+    wall = middle + np.array([[-60, 30, -25], [60, 30, -25], [60, 30, 25], [-60, 30, 25]])
+    seen = (reference.groups["inner"] < 0.5)[skin.triangles].all(axis=1)
+    points = drawn(skin.faces, skin.vertices)
+    triangles = np.concatenate([skin.triangles[seen], len(points) + np.array([[0, 1, 2], [0, 2, 3]])])
+    assert gaps_in_eyes(marks, np.eye(3), Surface(np.concatenate([points, wall]), triangles)).show_open
+
+
+def test_a_slit_along_the_lids_shows_them_shut(reference):
+    target, marks = scanned(reference, BOTH, slit)
+    gaps = gaps_in_eyes(marks, np.eye(3), target)
+    assert gaps.show_shut and gaps.slits > 0.5
+    turn = np.linalg.qr(np.random.default_rng(2).standard_normal((3, 3)))[0]
+    turn *= 1.3 * np.sign(np.linalg.det(turn))
+    there = {name: turn @ place for name, place in marks.items()}
+    moved = gaps_in_eyes(there, turn, Surface(target.vertices @ turn.T, target.triangles))
+    assert moved.show_shut and moved.slits == pytest.approx(gaps.slits, abs=0.1)
+
+
+def test_an_opening_outweighs_slits():
+    assert EyeGaps(0.4, 0.5).show_open and not EyeGaps(0.4, 0.5).show_shut
+    assert not EyeGaps(0.1, 0.1).show_open and not EyeGaps(0.1, 0.1).show_shut
+
+
+def test_a_crevice_is_deeper_than_both_sides():
+    line = np.zeros((1, 60))
+    line[0, 30] = 4.0
+    line[0, 50:] = 4.0  # a step is none
+    assert np.flatnonzero(crevices(line)).tolist() == [30]
+
+
+def test_a_crease_is_followed_through_noise_and_holes():
+    rng = np.random.default_rng(1)
+    place = np.round(20 + 8 * np.sin(np.linspace(0, 3, 45))).astype(int)
+    depth = 0.1 * rng.standard_normal((45, 60))
+    depth[np.arange(45), place] += 1.0
+    depth[10:20, 5] = 3.0  # a short, deeper one beside it
+    depth[30, place[30]] = np.nan
+    worth = crease(depth, 8)
+    assert worth.max() <= 1.2 and worth[30, place[30]] == 1.2
+    assert np.abs(best_way(worth) - place).max() <= 1
+
+
+def test_lids_that_meet_have_one_crease_where_they_do(reference):
+    target, marks = scanned(reference, BOTH)
+    lines = {side: lid_line(marks, side, target, np.eye(3)) for side in BOTH}
+    assert shut_by_creases(lines) is True
+    for side, line in lines.items():
+        inner, outer = marks[f"en_{side}"], marks[f"ex_{side}"]
+        met = (marks[f"ps_{side}"] + marks[f"pi_{side}"]) / 2
+        share = (met - inner) @ (outer - inner) / ((outer - inner) @ (outer - inner))
+        assert np.abs(line.at(share) - met)[2] < 1.0
+
+
+def test_margins_of_open_lids_have_two_creases(reference):
+    """Eyeballs that are scanned leave no hole between open lids."""
+    skin = drawn(reference.skin.faces, reference.skin.vertices)
+    seen = (reference.groups["inner"] < 0.5)[reference.skin.triangles].all(axis=1)
+    points, triangles = [skin], [reference.skin.triangles[seen]]
+    for eye in ("eye_l", "eye_r"):
+        ball = reference.parts[eye]
+        triangles.append(ball.triangles + sum(map(len, points)))
+        points.append(ball.vertices)
+    target, marks = Surface(np.concatenate(points), np.concatenate(triangles)), reference.landmark_positions()
+    assert not gaps_in_eyes(marks, np.eye(3), target).show_open
+    assert shut_by_creases({side: lid_line(marks, side, target, np.eye(3)) for side in BOTH}) is False
+
+
+def test_smooth_skin_tells_nothing(reference):
+    marks = reference.landmark_positions()
+    wall = np.array([[-90, 0, -90], [90, 0, -90], [90, 0, 90], [-90, 0, 90.0]])
+    wall += np.mean([marks["en_l"], marks["en_r"]], axis=0)
+    target = Surface(wall, np.array([[0, 1, 2], [0, 2, 3]]))
+    assert shut_by_creases({side: lid_line(marks, side, target, np.eye(3)) for side in BOTH}) is None
+    assert met_at(marks, "l", target, np.eye(3)) is None
+
+
+def test_the_crease_near_the_landmarks_of_shut_lids_is_theirs(reference):
+    target, marks = scanned(reference, BOTH)
+    assert met_at(marks, "l", target, np.eye(3)) is not None
+    assert met_at({n: p for n, p in marks.items() if n != "en_l"}, "l", target, np.eye(3)) is None
+    away = marks | {"ps_l": marks["ps_l"] + [0, 0, 6], "pi_l": marks["pi_l"] + [0, 0, 6]}
+    assert met_at(away, "l", target, np.eye(3)) is None
+
+
+def test_margins_of_shut_lids_rise_and_fall_with_the_crease(reference):
+    """Where one landmark of a lid is picked 2 mm too high, the margins stay on the crease."""
+    shut = with_shut_eyes(reference, BOTH)
+    shut = shut.with_vertices({"skin": drawn(shut.skin.faces, shut.skin.vertices)})
+    target, marks = scanned(reference, BOTH)
+    high = marks | {name: marks[name] + [0, 0, 2.0] for name in ("ps_l", "pi_l")}
+    rim = rims(shut)
+    rows, alone, _ = lid_margins(shut, rim, high, np.eye(3), BOTH)
+    lines = {"l": met_at(high, "l", target, np.eye(3)), "r": None}
+    again, guided, _ = lid_margins(shut, rim, high, np.eye(3), BOTH, lines)
+    np.testing.assert_array_equal(rows, again)
+    left = shut.skin.vertices[rows, 0] > 0
+    true = shut.skin.vertices[rows]
+    off = [np.sqrt(np.mean((places - true)[left, 2] ** 2)) for places in (alone, guided)]
+    assert off[1] < 0.6 < off[0]
+    np.testing.assert_array_equal(alone[~left], guided[~left])
+
+
+def test_a_fit_to_shut_lids_lies_with_its_lids_on_the_line_and_shuts_no_farther(reference):
+    target, marks = scanned(reference, BOTH, slit)
+    space = shape_space(reference)
+    fit = drain(fit_shape(space, target, HERE))
+    fit, shown = drain(fit_expression(space, target, fit))
+    assert shown.shut == BOTH
+    laid = space.landmarks(fit.points)
+    for side in BOTH:
+        way = space.shut[side]
+        assert fit.coefficients @ way / (way @ way) == pytest.approx(1.0, abs=0.25)
+        for name in ("ps", "pi"):
+            assert abs(laid[f"{name}_{side}"] - marks[f"{name}_{side}"])[2] < 1.5
+
+
+def test_what_the_lines_tell_is_where_they_run(reference):
+    target, _ = scanned(reference, BOTH)
+    space = shape_space(reference)
+    fit = drain(fit_shape(space, target, HERE))
+    line = lid_line(space.landmarks(fit.points), "l", target, fit.matrix)
+    told = told_of_lids(space, fit, {"l": line})
+    assert told.places.shape == (4, 3)
+    np.testing.assert_allclose(told.places[0], line.at(0.0))
+    assert COLUMNS[MIDDLE].min() > 0.2
