@@ -7,6 +7,7 @@ from scipy.spatial import cKDTree
 from ..adapt.closest import Surface
 from ..relax.mouth_gap import lip_edges
 from .eye_gaps import gaps_in_eyes
+from .eyeballs_seen import margins_seen, told_of_eyes
 from .lid_creases import lid_lines, shut_by_creases, told_of_lids
 from .mouth_outline import MouthOutline, mouth_outline
 from .shape_fit import CHANGE, Expression, ShapeFit, Told, fit_shape
@@ -45,6 +46,12 @@ def fit_expression(space: ShapeSpace, target: Surface, fit: ShapeFit):
     parted = gap and cost(space, free, mouth) < NO_WORSE * cost(space, fit, mouth)
     fit, told = (free, told) if parted else (fit, None)
     shut = shut_by_sight(space, fit, target)
+    seen = {} if shut else margins_seen(space.landmarks(fit.points), fit.matrix, target)
+    if seen:
+        eyes_told = told_of_eyes(space, fit, seen)
+        told = eyes_told if told is None else told.and_of(eyes_told)
+        work = fit_shape(space, target, fit.pose, CHANGE, fit.coefficients, 1, Expression(parted), told)
+        return (yield from _part(work, 2)), Expression(parted, lids=seen)
     if shut is False:
         if max(shut_share(space, fit).values()) <= DROOPED:
             return fit, Expression(parted)

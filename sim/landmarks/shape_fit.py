@@ -6,7 +6,7 @@ that are most likely given the data (least squares with the space's own variance
 the scan's normals count and outliers are given up (Geman and McClure 1987).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -44,11 +44,12 @@ class NoFaceError(Exception):
 @dataclass(frozen=True)
 class Expression:
     """What lips and lids do: whether the lips are ``parted``, the sides ("l", "r") of eyes that are ``shut``, and whether
-    eyes are ``wide`` open, as the reference's."""
+    eyes are ``wide`` open, as the reference's. ``lids`` : name -> (3,) mm, ``ps`` and ``pi`` of eyes that are seen open."""
 
     parted: bool = False
     shut: tuple[str, ...] = ()
     wide: bool = False
+    lids: dict[str, np.ndarray] = field(default_factory=dict)
 
 
 REST = Expression()

@@ -1,0 +1,152 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Eyeballs that a scan shows: the one sphere in a face, and the margins of the lids, where it ends above and below.
+
+A skin laid on a scan with eyeballs takes them for lids; what is told of where they end keeps it off them.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import gaussian_filter
+from scipy.spatial import cKDTree
+
+from ..adapt.closest import Surface
+from ..relax.mouth_gap import depths
+from .picked import MOVED
+from .shape_fit import ShapeFit, Told
+from .shape_space import ShapeSpace
+
+ASIDE, ACROSS, STEP = (
+    20.0,
+    14.0,
+    0.6,
+)  # mm to either side of an eye's middle, above and below it, and from place to place
+SMOOTH = 1.0  # places over which the surface is smoothed before its normals are taken
+#: mm: radii that are tried, and the spread of the centres that the normals of one sphere point to.
+RADII, CENTRES = np.arange(8.5, 13.1, 0.5), 0.7
+FACING = 0.5  # cosine between forward and the normal of a place that is looked at
+ON, AGREE = 0.35, 0.97  # mm from a sphere, and cosine between normals, up to which a place lies on it
+#: A sphere that is an eyeball: mm of radius (that of what is seen, the cornea and the white around it, is smaller than the
+#: eyeball's), mm by which the scan strays from it, mm² of it that are seen. Eyeballs stray by .03-.06, all else by .07 or more.
+RADIUS, STRAYS, SEEN = (7.5, 13.2), 0.065, 40.0
+#: mm before and behind the sphere: a lid stands before it, the white falls back from a cornea.
+BEFORE, BEHIND = 0.4, 1.0
+MIDDLE = 4.0  # mm to either side of an eyeball's middle in which its lids are looked at
+MARGIN = {"ps": 0.8, "pi": -0.6}  # mm from where an eyeball ends up and down to where people pick the margin of the lid
+
+
+@dataclass(frozen=True, eq=False)
+class Ball:
+    """middle (3,) and radius mm of a sphere; strays : mm, mean distance of what lies ``on`` it (r, c) bool."""
+
+    middle: np.ndarray
+    radius: float
+    strays: float
+    on: np.ndarray
+
+    @property
+    def is_eyeball(self) -> bool:
+        """Whether it is one."""
+        seen = self.on.sum() * STEP**2
+        return RADIUS[0] < self.radius < RADIUS[1] and self.strays < STRAYS and seen > SEEN
+
+
+def margins_seen(marks, matrix, target: Surface) -> dict[str, np.ndarray]:
+    """Name -> (3,) mm: ``ps`` and ``pi`` of the eyes whose eyeballs the scan shows, on the margins of their lids.
+
+    marks : name -> (3,) mm, about where ``en`` and ``ex`` lie; matrix (3, 3) turns and scales the reference into the scan
+    """
+    scale = np.cbrt(np.linalg.det(matrix))
+    forward = -matrix[:, 1] / np.linalg.norm(matrix[:, 1])
+    out = {}
+    for side in "lr":
+        inner, outer = marks[f"en_{side}"], marks[f"ex_{side}"]
+        along = outer - inner - (outer - inner) @ forward * forward
+        along /= np.linalg.norm(along)
+        up = np.cross(forward, along)
+        up *= np.sign(up @ matrix[:, 2])
+        x, y = np.arange(-ASIDE, ASIDE + STEP / 2, STEP), np.arange(ACROSS, -ACROSS - STEP / 2, -STEP)
+        places = (inner + outer) / 2 + scale * (x[:, None] * along + y[:, None, None] * up)
+        depth = depths(target, places.reshape(-1, 3), forward).reshape(len(y), len(x)) / scale
+        ball = sphere_in(x, y, depth)
+        if ball is None or not ball.is_eyeball:
+            continue
+        for name, row, column in margins(x, y, depth, ball):
+            if np.isfinite(depth[row, column]):
+                out[f"{name}_{side}"] = places[row, column] - scale * depth[row, column] * forward
+    return out
+
+
+def sphere_in(x, y, depth) -> Ball | None:
+    """The sphere of an eyeball's size on which most of a surface lies; None: there is no surface.
+
+    x (c,), y (r,) mm to the side and up, downward; depth (r, c) mm behind, NaN where there is nothing
+    """
+    there = np.isfinite(depth)
+    filled, full = (gaussian_filter(np.where(there, value, 0.0), SMOOTH) for value in (depth, 1.0))
+    smooth = np.where(there, filled / np.maximum(full, 1e-3), np.nan)
+    down, across = np.gradient(smooth, STEP)
+    normals = np.stack([across, -down, np.ones_like(across)], axis=-1)
+    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+    points = np.stack([*np.meshgrid(x, y), -smooth], axis=-1)
+    use = np.isfinite(normals).all(axis=-1) & there
+    use[use] = normals[use][:, 2] > FACING
+    p, n = points[use], normals[use]
+    if len(p) < 4:
+        return None
+    votes = []
+    for radius in RADII:
+        centres = p - radius * n
+        tree = cKDTree(centres)
+        count = tree.query_ball_point(centres, CENTRES, return_length=True)
+        most = count.argmax()
+        votes.append((count[most], radius, centres[tree.query_ball_point(centres[most], CENTRES)].mean(axis=0)))
+    _, radius, middle = max(votes, key=lambda vote: vote[0])
+    for _ in range(4):
+        on = _on_sphere(p, n, middle, radius)
+        if on.sum() < 4:
+            return None
+        rows = np.column_stack([2 * p[on], np.ones(on.sum())])
+        found = np.linalg.lstsq(rows, (p[on] ** 2).sum(axis=1), rcond=None)[0]
+        middle, radius = found[:3], float(np.sqrt(max(found[3] + found[:3] @ found[:3], 0.0)))
+    on = _on_sphere(p, n, middle, radius)
+    if not on.any():
+        return None
+    strays = np.abs(np.linalg.norm(p[on] - middle, axis=1) - radius).mean()
+    lies = np.zeros(depth.shape, dtype=bool)
+    lies[use] = on
+    return Ball(middle, radius, float(strays), lies)
+
+
+def _on_sphere(points, normals, middle, radius):
+    """Which of the points (k, 3) with their normals lie on a sphere."""
+    arm = points - middle
+    away = np.linalg.norm(arm, axis=1)
+    return (np.abs(away - radius) < ON) & (np.einsum("ki,ki->k", arm, normals) > AGREE * away)
+
+
+def margins(x, y, depth, ball: Ball):
+    """Name, row and column of the places on ``depth`` (r, c) where people pick the margins of the lids around a ``ball``."""
+    columns = np.flatnonzero(ball.on.any(axis=0) & (np.abs(x - ball.middle[0]) < MIDDLE))
+    if len(columns) == 0:
+        return []
+    points = np.stack([*np.meshgrid(x[columns], y), -depth[:, columns]], axis=-1)
+    before = np.linalg.norm(points - ball.middle, axis=-1) - ball.radius
+    eye = np.isfinite(before) & (before > -BEHIND) & (before < BEFORE)
+    row = int(np.median(np.flatnonzero(ball.on.any(axis=1))))
+    above, below = eye[: row + 1][::-1], eye[row:]
+    up, down = (np.where(part.all(axis=0), len(part), (~part).argmax(axis=0)) - 1 for part in (above, below))
+    middle = int(np.abs(x - ball.middle[0]).argmin())
+    ends = {"ps": row - up.max(), "pi": row + down.max()}
+    return [(name, int(np.clip(end - round(MARGIN[name] / STEP), 0, len(y) - 1)), middle) for name, end in ends.items()]
+
+
+def told_of_eyes(space: ShapeSpace, fit: ShapeFit, seen: dict[str, np.ndarray]) -> Told:
+    """What margins of lids that are ``seen``, name -> (3,) mm as people pick them, tell of the skin of ``fit``."""
+    rows, places = [], []
+    for name, place in seen.items():
+        base, side = name.split("_")
+        x, y, z = MOVED[base]
+        rows.append(space.names.index(name))
+        places.append(place - fit.matrix @ np.array([-x if side == "r" else x, y, z]))
+    return Told(space.corners[rows], space.weights[rows], np.array(places))
