@@ -8,10 +8,12 @@ from headshop.sim.adapt.closest import Surface
 from headshop.sim.adapt.shut_eyes import with_shut_eyes
 from headshop.sim.landmarks.expression import fit_expression
 from headshop.sim.landmarks.eyeballs_seen import ACROSS, ASIDE, STEP, margins, margins_seen, sphere_in
+from headshop.sim.landmarks.first_look import first_look
 from headshop.sim.landmarks.pose_search import Pose
 from headshop.sim.landmarks.shape_fit import fit_shape
 from headshop.sim.landmarks.shape_space import shape_space
 from headshop.sim.mesh_subdivision import drawn
+from headshop.sim.progress import finish
 
 X, Y = np.arange(-ASIDE, ASIDE + STEP / 2, STEP), np.arange(ACROSS, -ACROSS - STEP / 2, -STEP)
 
@@ -105,3 +107,11 @@ def test_a_skin_is_not_laid_on_eyeballs(reference):
     laid = space.landmarks(fit.points)
     for name in shown.lids:
         assert abs(laid[name] - marks[name])[2] < 2.5
+
+
+def test_lids_around_eyeballs_are_told_where_none_are_given(reference):
+    target, marks = with_eyeballs(reference)
+    twelve = ("n", "prn", "sn", "en_l", "en_r", "ex_l", "ex_r", "ch_l", "ch_r", "gn", "t_l", "t_r")
+    told = finish(first_look(reference, target, {name: marks[name] for name in (*twelve, "pi_r")})).landmarks
+    assert set(told) == {*twelve, "pi_r", "ps_l", "pi_l"}  # one lid of the right eye was given: the artist knows
+    assert all(abs(told[name] - marks[name])[2] < 1.6 for name in ("ps_l", "pi_l"))

@@ -17,11 +17,11 @@ from ..relax.mouth_gap import MARKS
 from .expression import fit_expression
 from .held_by_lips import held_by_lips
 from .hidden_skin import hidden_skin, with_hidden_skin
+from .lids_told import lids_told
 from .placed_face import run
 from .pose_search import Pose
 from .shape_fit import NoFaceError, fit_shape
 from .shape_space import shape_space
-from .shut_lids import shut_lids
 
 LOOKING = "Looking at lids and lips"
 FEWEST = 4  # landmarks that tell where the head is
@@ -29,7 +29,7 @@ FEWEST = 4  # landmarks that tell where the head is
 
 @dataclass(frozen=True, eq=False)
 class FirstLook:
-    """landmarks : name -> (3,) mm, those given and those of eyes that are shut; lips : about where their landmarks are if
+    """landmarks : name -> (3,) mm, those given and those of lids that are seen; lips : about where their landmarks are if
     they are parted, if only a little, or None; target : the scan without what the lips hold; held_mm2 : how much of it that
     is; filled : with skin behind it, as it probably is; hidden (k,) : vertices of the reference's skin that make that up."""
 
@@ -66,7 +66,7 @@ def first_look(reference: Head, target: Surface, given: dict[str, np.ndarray], k
         fit, shown = yield from run(fit_expression(space, coarse, fit), 0.6, 1.0, LOOKING)
     except NoFaceError:
         return FirstLook(given, target, target)
-    landmarks = given | shut_lids(space, fit, shown, coarse, given)
+    landmarks = given | lids_told(space, fit, shown, coarse, given)
     laid = space.landmarks(fit.points)
     lips = {name: laid[name] for name in MARKS} if shown.parted else None
     if keep_held:
