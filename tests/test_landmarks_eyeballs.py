@@ -92,6 +92,22 @@ def test_margins_of_lids_are_where_eyeballs_end(reference, turned):
         assert abs((back @ place)[2] - marks[name][2]) < 1.6
 
 
+def test_an_eye_that_is_lost_is_the_other_ones_mirror_image(reference):
+    target, marks = with_eyeballs(reference)
+    middle = target.vertices[target.triangles].mean(axis=1)
+    lost = np.linalg.norm(middle - (marks["en_r"] + marks["ex_r"]) / 2, axis=1) < 14
+    found = margins_seen(marks, np.eye(3), target.without(lost))
+    for name in ("ps_r", "pi_r"):
+        np.testing.assert_allclose(found[name], found[f"{name[:2]}_l"] * [-1, 1, 1], atol=0.5)
+
+
+def test_noise_hides_no_two_eyeballs(reference):
+    target, marks = with_eyeballs(reference)
+    noise = 0.2 * np.random.default_rng(1).standard_normal(target.vertices.shape)
+    found = margins_seen(marks, np.eye(3), Surface(target.vertices + noise, target.triangles, smooth=2.0))
+    assert all(abs(place - marks[name])[2] < 2.0 for name, place in found.items()) and len(found) == 4
+
+
 def test_behind_shut_lids_no_eyeball_is_seen(reference):
     target, marks = with_eyeballs(reference, ("l", "r"))
     assert margins_seen(marks, np.eye(3), target) == {}

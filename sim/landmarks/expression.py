@@ -6,10 +6,11 @@ from scipy.spatial import cKDTree
 
 from ..adapt.closest import Surface
 from ..relax.mouth_gap import lip_edges
-from .eye_gaps import gaps_in_eyes
-from .eyeballs_seen import margins_seen, told_of_eyes
+from .eye_gaps import EyeGaps, gaps_in_eyes
+from .eyeballs_seen import eyeballs_seen
 from .lid_creases import lid_lines, shut_by_creases, told_of_lids
 from .mouth_outline import MouthOutline, mouth_outline
+from .open_lids import open_lids, told_of_open_lids
 from .shape_fit import CHANGE, Expression, ShapeFit, Told, fit_shape
 from .shape_space import ShapeSpace
 
@@ -45,13 +46,16 @@ def fit_expression(space: ShapeSpace, target: Surface, fit: ShapeFit):
     mouth = about_mouth(space)
     parted = gap and cost(space, free, mouth) < NO_WORSE * cost(space, fit, mouth)
     fit, told = (free, told) if parted else (fit, None)
-    shut = shut_by_sight(space, fit, target)
-    seen = {} if shut else margins_seen(space.landmarks(fit.points), fit.matrix, target)
+    laid = space.landmarks(fit.points), fit.matrix, target
+    gaps = gaps_in_eyes(*laid)
+    known = gaps.show_open or (not gaps.show_shut and eyeballs_seen(*laid))
+    seen = open_lids(*laid) if known else {}
     if seen:
-        eyes_told = told_of_eyes(space, fit, seen)
-        told = eyes_told if told is None else told.and_of(eyes_told)
+        lids = told_of_open_lids(space, fit, seen)
+        told = lids if told is None else told.and_of(lids)
         work = fit_shape(space, target, fit.pose, CHANGE, fit.coefficients, 1, Expression(parted), told)
         return (yield from _part(work, 2)), Expression(parted, lids=seen)
+    shut = shut_by_sight(space, fit, target, gaps)
     if shut is False:
         if max(shut_share(space, fit).values()) <= DROOPED:
             return fit, Expression(parted)
@@ -69,9 +73,9 @@ def fit_expression(space: ShapeSpace, target: Surface, fit: ShapeFit):
     return (rival, both) if cost(space, rival, about) < REASON * cost(space, fit, about) else (fit, Expression(parted))
 
 
-def shut_by_sight(space: ShapeSpace, fit: ShapeFit, target: Surface) -> bool | None:
-    """Whether the eyes are seen to be shut: by what the scan lacks there, or else by its creases; None: that is not seen."""
-    gaps = gaps_in_eyes(space.landmarks(fit.points), fit.matrix, target)
+def shut_by_sight(space: ShapeSpace, fit: ShapeFit, target: Surface, gaps: EyeGaps) -> bool | None:
+    """Whether the eyes are seen to be shut: by what the scan lacks there, its ``gaps``, or by its creases; None: that is not
+    seen."""
     if gaps.show_open or gaps.show_shut:
         return gaps.show_shut
     shut = shut_by_creases(lid_lines(space, fit, target))

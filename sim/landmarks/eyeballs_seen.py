@@ -1,8 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Eyeballs that a scan shows: the one sphere in a face, and the margins of the lids, where it ends above and below.
-
-A skin laid on a scan with eyeballs takes them for lids; what is told of where they end keeps it off them.
-"""
+"""Eyeballs that a scan shows: the one sphere in a face. A skin laid on a scan with eyeballs takes them for lids."""
 
 from dataclasses import dataclass
 
@@ -12,9 +9,6 @@ from scipy.spatial import cKDTree
 
 from ..adapt.closest import Surface
 from ..relax.mouth_gap import depths
-from .picked import MOVED
-from .shape_fit import ShapeFit, Told
-from .shape_space import ShapeSpace
 
 ASIDE, ACROSS, STEP = (
     20.0,
@@ -29,10 +23,10 @@ ON, AGREE = 0.35, 0.97  # mm from a sphere, and cosine between normals, up to wh
 #: A sphere that is an eyeball: mm of radius (that of what is seen, the cornea and the white around it, is smaller than the
 #: eyeball's), mm by which the scan strays from it, mm² of it that are seen. Eyeballs stray by .03-.06, all else by .07 or more.
 RADIUS, STRAYS, SEEN = (7.5, 13.2), 0.065, 40.0
-#: mm before and behind the sphere: a lid stands before it, the white falls back from a cornea.
-BEFORE, BEHIND = 0.4, 1.0
-MIDDLE = 4.0  # mm to either side of an eyeball's middle in which its lids are looked at
-MARGIN = {"ps": 0.8, "pi": -0.6}  # mm from where an eyeball ends up and down to where people pick the margin of the lid
+#: Two that are alike may stray more, where a scan is noisy: mm of radius, mm by which the scan strays, difference of the radii
+#: against one, and mm between their places in their eyes. Noise of 0.2 mm makes eyeballs stray by .08; what else strays as
+#: little is not alike.
+ALIKE_RADIUS, ALIKE_STRAYS, ALIKE, ALIKE_PLACE = 11.0, 0.1, 0.12, 2.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,34 +41,37 @@ class Ball:
     @property
     def is_eyeball(self) -> bool:
         """Whether it is one."""
-        seen = self.on.sum() * STEP**2
-        return RADIUS[0] < self.radius < RADIUS[1] and self.strays < STRAYS and seen > SEEN
+        return RADIUS[0] < self.radius < RADIUS[1] and self.strays < STRAYS and self._seen
+
+    @property
+    def _seen(self) -> bool:
+        return self.on.sum() * STEP**2 > SEEN
+
+    def is_like(self, other: "Ball") -> bool:
+        """Whether both are eyeballs because they are like each other."""
+        small = all(ball.radius < ALIKE_RADIUS and ball.strays < ALIKE_STRAYS and ball._seen for ball in (self, other))
+        near = np.abs(self.middle - other.middle)[:2].max() < ALIKE_PLACE
+        return bool(small and near and abs(self.radius / other.radius - 1) < ALIKE)
 
 
-def margins_seen(marks, matrix, target: Surface) -> dict[str, np.ndarray]:
-    """Name -> (3,) mm: ``ps`` and ``pi`` of the eyes whose eyeballs the scan shows, on the margins of their lids.
+def eyeballs_seen(marks, matrix, target: Surface) -> bool:
+    """Whether a scan shows the eyeball of one eye at least.
 
     marks : name -> (3,) mm, about where ``en`` and ``ex`` lie; matrix (3, 3) turns and scales the reference into the scan
     """
     scale = np.cbrt(np.linalg.det(matrix))
     forward = -matrix[:, 1] / np.linalg.norm(matrix[:, 1])
-    out = {}
+    x, y = np.arange(-ASIDE, ASIDE + STEP / 2, STEP), np.arange(ACROSS, -ACROSS - STEP / 2, -STEP)
+    balls = []
     for side in "lr":
         inner, outer = marks[f"en_{side}"], marks[f"ex_{side}"]
         along = outer - inner - (outer - inner) @ forward * forward
         along /= np.linalg.norm(along)
         up = np.cross(forward, along)
         up *= np.sign(up @ matrix[:, 2])
-        x, y = np.arange(-ASIDE, ASIDE + STEP / 2, STEP), np.arange(ACROSS, -ACROSS - STEP / 2, -STEP)
         places = (inner + outer) / 2 + scale * (x[:, None] * along + y[:, None, None] * up)
-        depth = depths(target, places.reshape(-1, 3), forward).reshape(len(y), len(x)) / scale
-        ball = sphere_in(x, y, depth)
-        if ball is None or not ball.is_eyeball:
-            continue
-        for name, row, column in margins(x, y, depth, ball):
-            if np.isfinite(depth[row, column]):
-                out[f"{name}_{side}"] = places[row, column] - scale * depth[row, column] * forward
-    return out
+        balls.append(sphere_in(x, y, depths(target, places.reshape(-1, 3), forward).reshape(len(y), len(x)) / scale))
+    return any(ball is not None and ball.is_eyeball for ball in balls) or (all(balls) and balls[0].is_like(balls[1]))
 
 
 def sphere_in(x, y, depth) -> Ball | None:
@@ -123,30 +120,3 @@ def _on_sphere(points, normals, middle, radius):
     arm = points - middle
     away = np.linalg.norm(arm, axis=1)
     return (np.abs(away - radius) < ON) & (np.einsum("ki,ki->k", arm, normals) > AGREE * away)
-
-
-def margins(x, y, depth, ball: Ball):
-    """Name, row and column of the places on ``depth`` (r, c) where people pick the margins of the lids around a ``ball``."""
-    columns = np.flatnonzero(ball.on.any(axis=0) & (np.abs(x - ball.middle[0]) < MIDDLE))
-    if len(columns) == 0:
-        return []
-    points = np.stack([*np.meshgrid(x[columns], y), -depth[:, columns]], axis=-1)
-    before = np.linalg.norm(points - ball.middle, axis=-1) - ball.radius
-    eye = np.isfinite(before) & (before > -BEHIND) & (before < BEFORE)
-    row = int(np.median(np.flatnonzero(ball.on.any(axis=1))))
-    above, below = eye[: row + 1][::-1], eye[row:]
-    up, down = (np.where(part.all(axis=0), len(part), (~part).argmax(axis=0)) - 1 for part in (above, below))
-    middle = int(np.abs(x - ball.middle[0]).argmin())
-    ends = {"ps": row - up.max(), "pi": row + down.max()}
-    return [(name, int(np.clip(end - round(MARGIN[name] / STEP), 0, len(y) - 1)), middle) for name, end in ends.items()]
-
-
-def told_of_eyes(space: ShapeSpace, fit: ShapeFit, seen: dict[str, np.ndarray]) -> Told:
-    """What margins of lids that are ``seen``, name -> (3,) mm as people pick them, tell of the skin of ``fit``."""
-    rows, places = [], []
-    for name, place in seen.items():
-        base, side = name.split("_")
-        x, y, z = MOVED[base]
-        rows.append(space.names.index(name))
-        places.append(place - fit.matrix @ np.array([-x if side == "r" else x, y, z]))
-    return Told(space.corners[rows], space.weights[rows], np.array(places))

@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The margins of open lids: two arches from corner to corner of an eye, with holes or creases inside and skin outside.
+
+Where lids end, data end, or an eyeball begins; beyond it lies smooth skin. Of all pairs of arches the one is taken along which
+that is plainest on both eyes at once, because eyes are open alike: a hole in a brow or a fold above a lid is on no two sides
+what a margin is. (Daugman 1993 finds the lids' edges in pictures of irises by the same difference of two sums along an arch.)
+"""
+
+import numpy as np
+
+from ..adapt.closest import Surface
+from ..adapt.lid_line import BESIDE, DEEPEST, crease
+from ..relax.mouth_gap import depths
+from .picked import MOVED
+from .shape_fit import ShapeFit, Told
+from .shape_space import ShapeSpace
+
+SHARES = np.linspace(0.12, 0.88, 39)  # of the way from the inner to the outer corner
+TOP, BOTTOM, STEP = 15.0, -12.0, 0.25  # mm above and below the straight way that are looked at, and from place to place
+ARCHES = np.arange(-8.0, 13.1, 0.25)  # mm: heights of arches in their middle
+BAND = 1.75  # mm inside and outside an arch
+USUAL, SPREAD, HEEDED = 9.0, 3.0, 0.25  # mm between open lids, and how much that counts against what is seen
+LEAST = 2.5  # mm between lids that are open
+PLAIN = 0.9  # of 4: difference between inside and outside of two arches on two eyes from which on they are margins
+MARGIN = {"ps": 0.5, "pi": -0.2}  # mm from the arch to where people pick the margin of the lid
+
+
+def open_lids(marks, matrix, target: Surface) -> dict[str, np.ndarray]:
+    """Name -> (3,) mm: ``ps`` and ``pi`` of both eyes, on the margins of their lids; nothing if these are not seen plainly.
+
+    Of a scan whose eyes are known to be open: other creases, on shut lids or of wrinkles, may look alike.
+
+    marks : name -> (3,) mm, about where the eyes' landmarks lie; matrix (3, 3) turns and scales the reference into the scan
+    """
+    scale = np.cbrt(np.linalg.det(matrix))
+    forward = -matrix[:, 1] / np.linalg.norm(matrix[:, 1])
+    heights = np.arange(TOP, BOTTOM - STEP / 2, -STEP)
+    upper, lower, eyes = 0.0, 0.0, {}
+    for side in "lr":
+        inner, outer = marks[f"en_{side}"], marks[f"ex_{side}"]
+        up = np.cross(forward, outer - inner)
+        up *= np.sign(up @ matrix[:, 2]) / np.linalg.norm(up)
+        lines = inner + SHARES[:, None] * (outer - inner)
+        places = lines[:, None] + scale * heights[:, None] * up
+        depth = depths(target, places.reshape(-1, 3), forward).reshape(places.shape[:2]) / scale
+        above, below = arches(crease(depth, int(BESIDE / STEP)) / DEEPEST)
+        upper, lower, eyes[side] = upper + above, lower + below, (places, depth)
+    pair = best_pair(upper, lower)
+    if pair is None:
+        return {}
+    out = {}
+    for side, (places, depth) in eyes.items():
+        inner, way = marks[f"en_{side}"], marks[f"ex_{side}"] - marks[f"en_{side}"]
+        for name, arch in zip(("ps", "pi"), pair, strict=True):
+            share = (marks[f"{name}_{side}"] - inner) @ way / (way @ way) + MOVED[name][0] * scale / np.linalg.norm(way)
+            column = int(np.abs(SHARES - share).argmin())
+            height = arch * bow()[column] + MARGIN[name]
+            row = int(np.clip(np.rint((TOP - height) / STEP), 0, len(heights) - 1))
+            seen = np.flatnonzero(np.isfinite(depth[column]))
+            if len(seen) == 0:
+                continue
+            beyond = (
+                seen[seen <= row] if name == "ps" else seen[seen >= row]
+            )  # the lid, and not what lies between the lids
+            behind = depth[column, (beyond if len(beyond) else seen)[-1 if name == "ps" else 0]]
+            out[f"{name}_{side}"] = places[column, row] - scale * behind * forward
+    return out
+
+
+def bow() -> np.ndarray:
+    """How high an arch of height 1 is at each of the `SHARES`."""
+    return 4 * SHARES * (1 - SHARES)
+
+
+def arches(worth) -> tuple[np.ndarray, np.ndarray]:
+    """How plainly each of the `ARCHES` is the margin of an upper lid, and of a lower one: -1..1.
+
+    worth (c, r) 0..1 : how little a scan shows smooth skin in each of the columns at `SHARES`, from `TOP` to `BOTTOM`
+    """
+    sums = np.pad(np.cumsum(worth, axis=1), ((0, 0), (1, 0))) * STEP
+    columns, last = np.arange(len(worth)), worth.shape[1]
+
+    def above(height):
+        at = np.clip((TOP - height) / STEP, 0, last - 1e-6)
+        row = at.astype(int)
+        return sums[columns, row] + (at - row) * (sums[columns, row + 1] - sums[columns, row])
+
+    arch = ARCHES[:, None] * bow()
+    over, under = above(arch) - above(arch + BAND), above(arch - BAND) - above(arch)
+    difference = (under - over).mean(axis=1) / BAND
+    return difference, -difference
+
+
+def best_pair(upper, lower) -> tuple[float, float] | None:
+    """Heights mm of the upper and the lower of two `ARCHES` that are the plainest margins, how plainly each being summed over
+    both eyes in ``upper`` and ``lower``; None: none are plain."""
+    seen = upper[:, None] + lower
+    size = ARCHES[:, None] - ARCHES
+    liked = np.where(size < LEAST, -np.inf, seen - HEEDED * ((size - USUAL) / SPREAD) ** 2)
+    above, below = np.unravel_index(liked.argmax(), liked.shape)
+    return (float(ARCHES[above]), float(ARCHES[below])) if seen[above, below] > PLAIN else None
+
+
+def told_of_open_lids(space: ShapeSpace, fit: ShapeFit, seen: dict[str, np.ndarray]) -> Told:
+    """What margins of lids that are ``seen``, name -> (3,) mm as people pick them, tell of the skin of ``fit``."""
+    rows, places = [], []
+    for name, place in seen.items():
+        base, side = name.split("_")
+        x, y, z = MOVED[base]
+        rows.append(space.names.index(name))
+        places.append(place - fit.matrix @ np.array([-x if side == "r" else x, y, z]))
+    return Told(space.corners[rows], space.weights[rows], np.array(places))
