@@ -11,6 +11,7 @@ import numpy as np
 from ..adapt.closest import Surface
 from ..adapt.lid_line import BESIDE, DEEPEST, crease
 from ..relax.mouth_gap import depths
+from .eye_gaps import SOCKET, over_the_eye
 from .picked import MOVED
 from .shape_fit import ShapeFit, Told
 from .shape_space import ShapeSpace
@@ -22,6 +23,7 @@ BAND = 1.75  # mm inside and outside an arch
 USUAL, SPREAD, HEEDED = 9.0, 3.0, 0.25  # mm between open lids, and how much that counts against what is seen
 LEAST = 2.5  # mm between lids that are open
 PLAIN = 0.9  # of 4: difference between inside and outside of two arches on two eyes from which on they are margins
+NEAR = 6.0  # mm before or behind where a lid is taken to lie: what lies farther off is none
 MARGIN = {"ps": 0.5, "pi": -0.2}  # mm from the arch to where people pick the margin of the lid
 
 
@@ -43,6 +45,7 @@ def open_lids(marks, matrix, target: Surface) -> dict[str, np.ndarray]:
         lines = inner + SHARES[:, None] * (outer - inner)
         places = lines[:, None] + scale * heights[:, None] * up
         depth = depths(target, places.reshape(-1, 3), forward).reshape(places.shape[:2]) / scale
+        depth[depth - over_the_eye(depth) > SOCKET] = np.nan
         above, below = arches(crease(depth, int(BESIDE / STEP)) / DEEPEST)
         upper, lower, eyes[side] = upper + above, lower + below, (places, depth)
     pair = best_pair(upper, lower)
@@ -63,7 +66,9 @@ def open_lids(marks, matrix, target: Surface) -> dict[str, np.ndarray]:
                 seen[seen <= row] if name == "ps" else seen[seen >= row]
             )  # the lid, and not what lies between the lids
             behind = depth[column, (beyond if len(beyond) else seen)[-1 if name == "ps" else 0]]
-            out[f"{name}_{side}"] = places[column, row] - scale * behind * forward
+            place = places[column, row] - scale * behind * forward
+            if abs((place - marks[f"{name}_{side}"]) @ forward) < NEAR * scale:
+                out[f"{name}_{side}"] = place
     return out
 
 

@@ -1,0 +1,175 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Eyeballs that a scan shows, and the margins of open lids, around eyeballs and around holes."""
+
+import numpy as np
+import pytest
+
+from headshop.sim.adapt.closest import Surface
+from headshop.sim.adapt.shut_eyes import with_shut_eyes
+from headshop.sim.landmarks.expression import fit_expression
+from headshop.sim.landmarks.eyeballs_seen import ACROSS, ASIDE, STEP, eyeballs_seen, sphere_in
+from headshop.sim.landmarks.first_look import first_look
+from headshop.sim.landmarks.open_lids import ARCHES, SHARES, arches, best_pair, bow, open_lids
+from headshop.sim.landmarks.open_lids import BOTTOM as LOWEST
+from headshop.sim.landmarks.open_lids import STEP as FINE
+from headshop.sim.landmarks.open_lids import TOP as HIGHEST
+from headshop.sim.landmarks.pose_search import Pose
+from headshop.sim.landmarks.shape_fit import fit_shape
+from headshop.sim.landmarks.shape_space import shape_space
+from headshop.sim.mesh_subdivision import drawn
+from headshop.sim.progress import finish
+
+X, Y = np.arange(-ASIDE, ASIDE + STEP / 2, STEP), np.arange(ACROSS, -ACROSS - STEP / 2, -STEP)
+LIDS = ("ps_l", "pi_l", "ps_r", "pi_r")
+
+
+def drain(work):
+    """What the generator ``work`` returns."""
+    while True:
+        try:
+            next(work)
+        except StopIteration as end:
+            return end.value
+
+
+def skin_seen(reference, sides=(), eyeballs=("eye_l", "eye_r")):
+    """The skin as a scanner sees it, the eyes on ``sides`` shut, with ``eyeballs``, and its landmarks."""
+    head = with_shut_eyes(reference, sides)
+    seen = (head.groups["inner"] < 0.5)[head.skin.triangles].all(axis=1)
+    points, triangles = [drawn(head.skin.faces, head.skin.vertices)], [head.skin.triangles[seen]]
+    for eye in eyeballs:
+        ball = reference.parts[eye]
+        triangles.append(ball.triangles + sum(map(len, points)))
+        points.append(drawn(ball.faces, ball.vertices))
+    return Surface(np.concatenate(points), np.concatenate(triangles), smooth=2.0), head.landmark_positions()
+
+
+def turned(target, marks, turn):
+    """The same turned and scaled by ``turn`` (3, 3)."""
+    return Surface(target.vertices @ turn.T, target.triangles), {name: turn @ place for name, place in marks.items()}
+
+
+def any_turn(size):
+    """A rotation times ``size``."""
+    turn = np.linalg.qr(np.random.default_rng(5).standard_normal((3, 3)))[0]
+    return size * np.sign(np.linalg.det(turn)) * turn
+
+
+def eye(radius=10.0, upper=4.0, lower=-3.0, noise=0.0):
+    """Depth (r, c) mm of lids some 1 mm before a sphere that is seen between heights ``upper`` and ``lower``."""
+    across, up = np.meshgrid(X, Y)
+    ball = 12 - np.sqrt(np.maximum(radius**2 - (across - 1) ** 2 - up**2, 0))
+    opening = (1 - (across / 11) ** 2).clip(0)
+    lids = 1.2 + 0.02 * (across**2 + up**2)
+    depth = np.where((up < upper * opening) & (up > lower * opening), ball, lids)
+    return depth + noise * np.random.default_rng(0).standard_normal(depth.shape)
+
+
+def test_a_sphere_is_found_with_its_middle_and_radius():
+    ball = sphere_in(X, Y, eye(noise=0.02))
+    assert ball.is_eyeball and ball.radius == pytest.approx(10, abs=0.3)
+    np.testing.assert_allclose(ball.middle, [1, 0, -12], atol=0.4)
+
+
+@pytest.mark.parametrize(
+    "depth",
+    [
+        np.full((len(Y), len(X)), np.nan),
+        np.zeros((len(Y), len(X))),
+        0.02 * (X**2 + Y[:, None] ** 2),  # the lids of a shut eye, and brows and cheeks, are flatter
+        eye(noise=0.7),
+    ],
+)
+def test_nothing_else_is_an_eyeball(depth):
+    ball = sphere_in(X, Y, depth)
+    assert ball is None or not ball.is_eyeball
+
+
+def test_a_hole_beside_an_eyeball_does_no_harm():
+    depth = eye(noise=0.02)
+    depth[:, X > 6] = np.nan
+    assert sphere_in(X, Y, depth).is_eyeball
+
+
+def test_two_that_are_alike_may_be_noisy():
+    one, other = (sphere_in(X, Y, eye(upper=upper, noise=0.4)) for upper in (4.0, 4.6))
+    assert not one.is_eyeball and one.is_like(other)
+    assert not one.is_like(sphere_in(X, Y, eye(radius=13.0, noise=0.4)))
+
+
+def test_eyeballs_are_seen_between_open_lids_only(reference):
+    target, marks = skin_seen(reference)
+    assert eyeballs_seen(marks, np.eye(3), target)
+    turn = any_turn(0.8)
+    assert eyeballs_seen(*(turned(target, marks, turn)[1], turn, turned(target, marks, turn)[0]))
+    target, marks = skin_seen(reference, ("l", "r"))
+    assert not eyeballs_seen(marks, np.eye(3), target)
+
+
+@pytest.mark.parametrize("eyeballs", [("eye_l", "eye_r"), ("eye_l",), ()])
+@pytest.mark.parametrize("noise", [0.0, 0.2])
+def test_margins_of_open_lids_are_seen_around_eyeballs_and_holes(reference, eyeballs, noise):
+    target, marks = skin_seen(reference, (), eyeballs)
+    rough = target.vertices + noise * np.random.default_rng(1).standard_normal(target.vertices.shape)
+    turn = any_turn(1.2)
+    target, there = turned(Surface(rough, target.triangles), marks, turn)
+    seen = open_lids(there, turn, target)
+    assert set(seen) == set(LIDS)
+    for name, place in seen.items():
+        assert abs((np.linalg.solve(turn, place) - marks[name])[2]) < 1.8
+
+
+def test_holes_in_brows_are_no_margins(reference):
+    target, marks = skin_seen(reference, (), ())
+    middle = target.vertices[target.triangles].mean(axis=1)
+    brow = (marks["ps_l"] + [0, 0, 9.0], marks["ps_r"] + [6, 0, 12.0])
+    lost = np.min([np.linalg.norm((middle - place)[:, [0, 2]], axis=1) for place in brow], axis=0) < 4
+    seen = open_lids(marks, np.eye(3), target.without(lost & (middle[:, 1] < 0)))
+    assert all(abs(place - marks[name])[2] < 1.8 for name, place in seen.items()) and len(seen) == 4
+
+
+def test_the_plainest_arches_lie_along_what_is_lacking():
+    heights = np.arange(HIGHEST, LOWEST - FINE / 2, -FINE)
+    curve = bow()
+    worth = ((heights < 6 * curve[:, None]) & (heights > -3 * curve[:, None])).astype(float)
+    upper, lower = arches(worth)
+    assert ARCHES[upper.argmax()] == pytest.approx(6, abs=0.3) and ARCHES[lower.argmax()] == pytest.approx(-3, abs=0.3)
+    assert best_pair(2 * upper, 2 * lower) == pytest.approx((6, -3), abs=0.3)
+    assert curve.max() == pytest.approx(1) and len(SHARES) == len(curve)
+
+
+def test_the_bottom_of_a_socket_is_no_lid(reference):
+    """Made heads without eyeballs show the socket's bottom between the lids."""
+    target, marks = skin_seen(reference, (), ())
+    middle = np.mean([marks["en_l"], marks["en_r"]], axis=0)
+    wall = middle + np.array([[-60, 30, -25], [60, 30, -25], [60, 30, 25], [-60, 30, 25]])
+    shown = np.concatenate([target.triangles, len(target.vertices) + np.array([[0, 1, 2], [0, 2, 3]])])
+    seen = open_lids(marks, np.eye(3), Surface(np.concatenate([target.vertices, wall]), shown))
+    assert all(np.linalg.norm(place - marks[name]) < 4 for name, place in seen.items()) and len(seen) == 4
+
+
+def test_smooth_skin_has_no_margins(reference):
+    assert best_pair(np.zeros(len(ARCHES)), np.zeros(len(ARCHES))) is None
+    marks = reference.landmark_positions()
+    wall = np.array([[-90, 0, -90], [90, 0, -90], [90, 0, 90], [-90, 0, 90.0]])
+    wall += np.mean([marks["en_l"], marks["en_r"]], axis=0)
+    assert open_lids(marks, np.eye(3), Surface(wall, np.array([[0, 1, 2], [0, 2, 3]]))) == {}
+
+
+def test_a_skin_is_not_laid_on_eyeballs(reference):
+    target, marks = skin_seen(reference)
+    space = shape_space(reference)
+    fit = drain(fit_shape(space, target, Pose(1.0, np.eye(3), np.zeros(3), 0.0)))
+    fit, shown = drain(fit_expression(space, target, fit))
+    assert shown.shut == () and set(shown.lids) == set(LIDS)
+    laid = space.landmarks(fit.points)
+    for name in shown.lids:
+        assert abs(laid[name] - marks[name])[2] < 2.5
+
+
+def test_lids_around_eyeballs_are_told_where_none_are_given(reference):
+    target, marks = skin_seen(reference)
+    twelve = ("n", "prn", "sn", "en_l", "en_r", "ex_l", "ex_r", "ch_l", "ch_r", "gn", "t_l", "t_r")
+    told = finish(first_look(reference, target, {name: marks[name] for name in (*twelve, "pi_r")})).landmarks
+    assert set(told) == {*twelve, "pi_r", "ps_l", "pi_l"}  # one lid of the right eye was given: the artist knows
+    assert all(abs(told[name] - marks[name])[2] < 1.8 for name in ("ps_l", "pi_l"))
