@@ -35,6 +35,12 @@ FEW = 25  # percent of them at which lips that are parted may seem closed: noise
 
 def fit_expression(space: ShapeSpace, target: Surface, fit: ShapeFit):
     """A generator: yields the fraction done, returns the `ShapeFit` and the `Expression` that the scan shows."""
+    fit, parted, told = yield from _fit_lips(space, target, fit)
+    return (yield from _fit_lids(space, target, fit, parted, told))
+
+
+def _fit_lips(space, target, fit):
+    """As `fit_expression`; returns the `ShapeFit`, whether its lips are parted, and what is `Told` of them."""
     moved = fit.coefficients + space.parted
     free = yield from _part(fit_shape(space, target, fit.pose, CHANGE, moved, 1, Expression(True)), 0)
     outline = outline_of(space, free, target)
@@ -45,32 +51,37 @@ def fit_expression(space: ShapeSpace, target: Surface, fit: ShapeFit):
     gap = told is not None or lips_ajar(space, free, target)
     mouth = about_mouth(space)
     parted = gap and cost(space, free, mouth) < NO_WORSE * cost(space, fit, mouth)
-    fit, told = (free, told) if parted else (fit, None)
+    return (free, True, told) if parted else (fit, False, None)
+
+
+def _fit_lids(space, target, fit, parted, told):
+    """As `fit_expression`, of a ``fit`` whose lips are ``parted`` and of which that is ``told`` already."""
+
+    def changed(expression, start, more=None):
+        every = more if told is None else told.and_of(more)
+        return _part(fit_shape(space, target, fit.pose, CHANGE, start, 1, expression, every), 2)
+
     laid = space.landmarks(fit.points), fit.matrix, target
     gaps = gaps_in_eyes(*laid)
-    known = gaps.show_open or (not gaps.show_shut and eyeballs_seen(*laid))
-    seen = open_lids(*laid) if known else {}
+    known_open = gaps.show_open or (not gaps.show_shut and eyeballs_seen(*laid))
+    seen = open_lids(*laid) if known_open else {}
     if seen:
         lids = told_of_open_lids(space, fit, seen)
-        told = lids if told is None else told.and_of(lids)
-        work = fit_shape(space, target, fit.pose, CHANGE, fit.coefficients, 1, Expression(parted), told)
-        return (yield from _part(work, 2)), Expression(parted, lids=seen)
-    shut = shut_by_sight(space, fit, target, gaps)
+        return (yield from changed(Expression(parted), fit.coefficients, lids)), Expression(parted, lids=seen)
+    shut, share = shut_by_sight(space, fit, target, gaps), shut_share(space, fit)
     if shut is False:
-        if max(shut_share(space, fit).values()) <= DROOPED:
+        if max(share.values()) <= DROOPED:
             return fit, Expression(parted)
         wide = Expression(parted, wide=True)
-        return (yield from _part(fit_shape(space, target, fit.pose, CHANGE, fit.coefficients, 1, wide, told), 2)), wide
+        return (yield from changed(wide, fit.coefficients)), wide
     both = Expression(parted, ("l", "r"))
-    moved = fit.coefficients + sum((1 - share) * space.shut[side] for side, share in shut_share(space, fit).items())
+    moved = fit.coefficients + sum((1 - share[side]) * space.shut[side] for side in both.shut)
     if shut:
         lids = told_of_lids(space, fit, lid_lines(space, fit, target))
-        told = lids if told is None else told.and_of(lids)
-    rival = yield from _part(fit_shape(space, target, fit.pose, CHANGE, moved, 1, both, told), 2)
-    if shut or min(shut_share(space, fit).values()) > SHUT:
-        return rival, both
-    about = eyes(space)
-    return (rival, both) if cost(space, rival, about) < REASON * cost(space, fit, about) else (fit, Expression(parted))
+        return (yield from changed(both, moved, lids)), both
+    rival, about = (yield from changed(both, moved)), eyes(space)
+    better = min(share.values()) > SHUT or cost(space, rival, about) < REASON * cost(space, fit, about)
+    return (rival, both) if better else (fit, Expression(parted))
 
 
 def shut_by_sight(space: ShapeSpace, fit: ShapeFit, target: Surface, gaps: EyeGaps) -> bool | None:

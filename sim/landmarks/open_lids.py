@@ -3,7 +3,7 @@
 
 Where lids end, data end, or an eyeball begins; beyond it lies smooth skin. Of all pairs of arches the one is taken along which
 that is plainest on both eyes at once, because eyes are open alike: a hole in a brow or a fold above a lid is on no two sides
-what a margin is. (Daugman 1993 finds the lids' edges in pictures of irises by the same difference of two sums along an arch.)
+what a margin is. (Daugman 2004, *How iris recognition works*, finds lids in pictures by a like difference of sums along arcs.)
 """
 
 import numpy as np

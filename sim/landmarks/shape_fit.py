@@ -63,8 +63,10 @@ class Told:
     weights: np.ndarray
     places: np.ndarray
 
-    def and_of(self, other: "Told") -> "Told":
+    def and_of(self, other: "Told | None") -> "Told":
         """Both together."""
+        if other is None:
+            return self
         pairs = ((getattr(self, name), getattr(other, name)) for name in ("corners", "weights", "places"))
         return Told(*(np.concatenate(pair) for pair in pairs))
 
