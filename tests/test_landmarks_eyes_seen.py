@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from headshop.sim.adapt.closest import Surface
-from headshop.sim.adapt.lid_line import COLUMNS, MIDDLE, best_way, crease, lid_line, met_at
+from headshop.sim.adapt.lid_line import LidLine, best_way, crease, lid_line, met_at
 from headshop.sim.adapt.openings import lid_margins, rims
 from headshop.sim.adapt.shut_eyes import with_shut_eyes
 from headshop.sim.landmarks.expression import fit_expression
@@ -63,7 +63,7 @@ def test_the_bottom_of_an_empty_socket_is_no_eye(reference):
     """Made heads without eyeballs show their sockets, so no hole; the eyes are open all the same."""
     skin, marks = reference.skin, reference.landmark_positions()
     middle = np.mean([marks[f"{name}_{side}"] for name in ("en", "ex") for side in BOTH], axis=0)
-    wall = middle + np.array([[-60, 30, -25], [60, 30, -25], [60, 30, 25], [-60, 30, 25]])
+    wall = middle + np.array([[-60, 18, -25], [60, 18, -25], [60, 18, 25], [-60, 18, 25]])
     seen = (reference.groups["inner"] < 0.5)[skin.triangles].all(axis=1)
     points = drawn(skin.faces, skin.vertices)
     triangles = np.concatenate([skin.triangles[seen], len(points) + np.array([[0, 1, 2], [0, 2, 3]])])
@@ -101,7 +101,7 @@ def test_a_crease_is_followed_through_noise_and_holes():
     depth[10:20, 5] = 3.0  # a short, deeper one beside it
     depth[30, place[30]] = np.nan
     worth = crease(depth, 8)
-    assert worth.max() <= 1.2 and worth[30, place[30]] == 1.2
+    assert worth[30, place[30]] == 1.2
     assert np.abs(best_way(worth) - place).max() <= 1
 
 
@@ -145,6 +145,9 @@ def test_the_crease_near_the_landmarks_of_shut_lids_is_theirs(reference):
     assert met_at({n: p for n, p in marks.items() if n != "en_l"}, "l", target, np.eye(3)) is None
     away = marks | {"ps_l": marks["ps_l"] + [0, 0, 6], "pi_l": marks["pi_l"] + [0, 0, 6]}
     assert met_at(away, "l", target, np.eye(3)) is None
+    middle = target.vertices[target.triangles].mean(axis=1)
+    nothing = np.linalg.norm(middle - (marks["en_l"] + marks["ex_l"]) / 2, axis=1) < 18
+    assert met_at(marks, "l", target.without(nothing), np.eye(3)) is None
 
 
 def test_margins_of_shut_lids_rise_and_fall_with_the_crease(reference):
@@ -186,5 +189,7 @@ def test_what_the_lines_tell_is_where_they_run(reference):
     line = lid_line(space.landmarks(fit.points), "l", target, fit.matrix)
     told = told_of_lids(space, fit, {"l": line})
     assert told.places.shape == (4, 3)
-    np.testing.assert_allclose(told.places[0], line.at(0.0))
-    assert COLUMNS[MIDDLE].min() > 0.2
+    marks, up = space.landmarks(fit.points), fit.matrix[:, 2] / np.linalg.norm(fit.matrix[:, 2])
+    assert (told.places[0] - line.at(0.0)) @ up == pytest.approx(0, abs=1e-6)  # how high
+    np.testing.assert_allclose(np.cross(told.places[0] - marks["en_l"], up), 0, atol=1e-6)  # and not how deep
+    assert told_of_lids(space, fit, {"l": LidLine(line.places, 0.3, 0.0)}) is None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Eyes scanned shut are told from the scan where the landmarks given say nothing of their lids."""
+"""Lids, shut or open, are told from the scan where the landmarks given say nothing of them."""
 
 import numpy as np
 import pytest

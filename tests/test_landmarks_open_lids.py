@@ -142,7 +142,7 @@ def test_the_bottom_of_a_socket_is_no_lid(reference):
     """Made heads without eyeballs show the socket's bottom between the lids."""
     target, marks = skin_seen(reference, (), ())
     middle = np.mean([marks["en_l"], marks["en_r"]], axis=0)
-    wall = middle + np.array([[-60, 30, -25], [60, 30, -25], [60, 30, 25], [-60, 30, 25]])
+    wall = middle + np.array([[-60, 18, -25], [60, 18, -25], [60, 18, 25], [-60, 18, 25]])
     shown = np.concatenate([target.triangles, len(target.vertices) + np.array([[0, 1, 2], [0, 2, 3]])])
     seen = open_lids(marks, np.eye(3), Surface(np.concatenate([target.vertices, wall]), shown))
     assert all(np.linalg.norm(place - marks[name]) < 4 for name, place in seen.items()) and len(seen) == 4
@@ -173,3 +173,20 @@ def test_lids_around_eyeballs_are_told_where_none_are_given(reference):
     told = finish(first_look(reference, target, {name: marks[name] for name in (*twelve, "pi_r")})).landmarks
     assert set(told) == {*twelve, "pi_r", "ps_l", "pi_l"}  # one lid of the right eye was given: the artist knows
     assert all(abs(told[name] - marks[name])[2] < 1.8 for name in ("ps_l", "pi_l"))
+
+
+@pytest.mark.parametrize("width", [1.0, 2.0])
+def test_eyes_are_open_of_which_a_strip_in_the_shade_is_lost(reference, width):
+    """It looks like the slit between shut lids, but there is an eyeball below it."""
+    target, marks = skin_seen(reference)
+    middle, lost = target.vertices[target.triangles].mean(axis=1), np.zeros(len(target.triangles), dtype=bool)
+    for side in "lr":
+        inner, outer, top = (marks[f"{name}_{side}"] for name in ("en", "ex", "ps"))
+        share = (middle - inner) @ (outer - inner) / ((outer - inner) @ (outer - inner))
+        straight = (inner + share[:, None] * (outer - inner))[:, 2]
+        below = straight + (top - (inner + outer) / 2)[2] * 4 * share * (1 - share) - middle[:, 2]
+        lost |= (below > 0) & (below < width) & (share > 0) & (share < 1) & (middle[:, 1] < top[1] + 15)
+    space = shape_space(reference)
+    fit = drain(fit_shape(space, target, Pose(1.0, np.eye(3), np.zeros(3), 0.0)))
+    _, shown = drain(fit_expression(space, target.without(lost), fit))
+    assert shown.shut == ()

@@ -23,6 +23,8 @@ STEEP = 2  # places that a crease rises or falls from one column to the next, at
 BEND = 0.12  # mm of depth that each of them costs
 APART = 3.0  # mm between two creases
 PLAIN = 0.7  # mm deep that a crease is that is seen plainly
+#: How deep the second creases are against the deepest ones: from .48 on in 20 scans of open eyes, up to .26 in 15 of shut ones.
+SECOND = 0.37
 NEAR = 4.0  # mm above or below the landmarks of an eye within which a crease is that of its lids
 
 
@@ -104,4 +106,5 @@ def met_at(given, side: str, target: Surface, matrix) -> LidLine | None:
     middle = (given[f"ps_{side}"] + given[f"pi_{side}"]) / 2
     off = [place - line.at((place - inner) @ way / (way @ way)) for place in (inner, middle, inner + way)]
     height = np.abs(off @ matrix[:, 2]) / (matrix[:, 2] @ matrix[:, 2])
-    return line if line.depth >= PLAIN and height.max() < NEAR else None
+    alone = line.depth >= PLAIN and line.second < SECOND * line.depth  # where nothing is seen, nothing is
+    return line if alone and height.max() < NEAR else None

@@ -92,8 +92,8 @@ def like_ears(space: ShapeSpace, fit: ShapeFit) -> dict[str, float]:
 
 
 def sure_as_corners(confidence, name: str) -> float:
-    """Confidence in ``name`` (``ps`` or ``pi`` with a side) of a shut eye: the line on which lids meet is as sure as the less
-    sure of the eye's corners, between which it runs."""
+    """Confidence in ``name`` (``ps`` or ``pi`` with a side) of lids that are seen, shut or open: they are as sure as the less
+    sure of the eye's corners, between which they run."""
     side = name[-1]
     return min(confidence.get(f"en_{side}", 0.0), confidence.get(f"ex_{side}", 0.0))
 

@@ -5,6 +5,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..adapt.closest import Surface
+from ..adapt.lid_line import LidLine
 from ..relax.mouth_gap import lip_edges
 from .eye_gaps import EyeGaps, gaps_in_eyes
 from .eyeballs_seen import eyeballs_seen
@@ -42,12 +43,12 @@ def fit_expression(space: ShapeSpace, target: Surface, fit: ShapeFit):
 def _fit_lips(space, target, fit):
     """As `fit_expression`; returns the `ShapeFit`, whether its lips are parted, and what is `Told` of them."""
     moved = fit.coefficients + space.parted
-    free = yield from _part(fit_shape(space, target, fit.pose, CHANGE, moved, 1, Expression(True)), 0)
+    free = yield from _third(fit_shape(space, target, fit.pose, CHANGE, moved, 1, Expression(True)), 0)
     outline = outline_of(space, free, target)
     told = None if outline is None else told_of_mouth(space, outline)
     if told is not None:
         work = fit_shape(space, target, free.pose, CHANGE, free.coefficients, 1, Expression(True), told)
-        free = yield from _part(work, 1)
+        free = yield from _third(work, 1)
     gap = told is not None or lips_ajar(space, free, target)
     mouth = about_mouth(space)
     parted = gap and cost(space, free, mouth) < NO_WORSE * cost(space, fit, mouth)
@@ -59,16 +60,17 @@ def _fit_lids(space, target, fit, parted, told):
 
     def changed(expression, start, more=None):
         every = more if told is None else told.and_of(more)
-        return _part(fit_shape(space, target, fit.pose, CHANGE, start, 1, expression, every), 2)
+        return _third(fit_shape(space, target, fit.pose, CHANGE, start, 1, expression, every), 2)
 
     laid = space.landmarks(fit.points), fit.matrix, target
     gaps = gaps_in_eyes(*laid)
-    known_open = gaps.show_open or (not gaps.show_shut and eyeballs_seen(*laid))
+    known_open = gaps.show_open or eyeballs_seen(*laid)
     seen = open_lids(*laid) if known_open else {}
     if seen:
         lids = told_of_open_lids(space, fit, seen)
         return (yield from changed(Expression(parted), fit.coefficients, lids)), Expression(parted, lids=seen)
-    shut, share = shut_by_sight(space, fit, target, gaps), shut_share(space, fit)
+    lines, share = lid_lines(space, fit, target), shut_share(space, fit)
+    shut = False if known_open else shut_by_sight(gaps, lines, share)
     if shut is False:
         if max(share.values()) <= DROOPED:
             return fit, Expression(parted)
@@ -77,20 +79,22 @@ def _fit_lids(space, target, fit, parted, told):
     both = Expression(parted, ("l", "r"))
     moved = fit.coefficients + sum((1 - share[side]) * space.shut[side] for side in both.shut)
     if shut:
-        lids = told_of_lids(space, fit, lid_lines(space, fit, target))
-        return (yield from changed(both, moved, lids)), both
+        return (yield from changed(both, moved, told_of_lids(space, fit, lines))), both
     rival, about = (yield from changed(both, moved)), eyes(space)
     better = min(share.values()) > SHUT or cost(space, rival, about) < REASON * cost(space, fit, about)
     return (rival, both) if better else (fit, Expression(parted))
 
 
-def shut_by_sight(space: ShapeSpace, fit: ShapeFit, target: Surface, gaps: EyeGaps) -> bool | None:
-    """Whether the eyes are seen to be shut: by what the scan lacks there, its ``gaps``, or by its creases; None: that is not
-    seen."""
+def shut_by_sight(gaps: EyeGaps, lines: dict[str, LidLine], share: dict[str, float]) -> bool | None:
+    """Whether the eyes are seen to be shut: by what the scan lacks there, its ``gaps``, or by the creases ``lines`` along
+    them; None: that is not seen.
+
+    lines : side -> `LidLine`; share : side -> how far a fit has that eye shut
+    """
     if gaps.show_open or gaps.show_shut:
         return gaps.show_shut
-    shut = shut_by_creases(lid_lines(space, fit, target))
-    return None if shut and np.mean(list(shut_share(space, fit).values())) < WIDE else shut
+    shut = shut_by_creases(lines)
+    return None if shut and np.mean(list(share.values())) < WIDE else shut
 
 
 def shut_share(space: ShapeSpace, fit: ShapeFit) -> dict[str, float]:
@@ -113,13 +117,13 @@ def told_of_mouth(space: ShapeSpace, outline: MouthOutline) -> Told:
     return Told(corners, weights, np.array([*outline.corners.values(), outline.upper, outline.lower]))
 
 
-def _part(work, before, of=3):
+def _third(work, before):
     while True:
         try:
             done = next(work)
         except StopIteration as end:
             return end.value
-        yield (before + done) / of
+        yield (before + done) / 3
 
 
 def lips_ajar(space: ShapeSpace, free: ShapeFit, target: Surface) -> bool:

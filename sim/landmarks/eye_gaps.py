@@ -25,7 +25,8 @@ GAPING, SLITS = 0.3, 0.3
 
 @dataclass(frozen=True)
 class EyeGaps:
-    """gaping, slits : share of the lines over both eyes on which the scan lacks an opening, or no more than a slit."""
+    """gaping, slits : share of the lines over both eyes on which what the scan lacks extends over more than a slit, or over no
+    more than one."""
 
     gaping: float
     slits: float

@@ -78,10 +78,11 @@ def find_landmarks(mesh: Mesh, reference: Head | None = None, unit_scales=(1.0,)
     seen = Mesh.from_triangles(target.vertices, target.triangles)
     other = yield from portion(weighed(seen, positions, confidence, reference, target), 0.9, 1.0)
     positions = {n: p if n.partition("_")[0] in OWN else other[n] for n, p in positions.items()}
-    met = {n: p for n, p in meeting_lids(space, fit, target, shown.shut).items() if n in positions}
-    positions |= met | {n: p for n, p in shown.lids.items() if n in positions}
-    mid_air = tuple(n for n in mid_air if n not in met)
-    confidence |= {n: max(confidence[n], sure_as_corners(confidence, n)) for n in met}
+    lids = meeting_lids(space, fit, target, shown.shut) | shown.lids
+    lids = {n: p for n, p in lids.items() if n in positions}
+    positions |= lids
+    mid_air = tuple(n for n in mid_air if n not in lids)
+    confidence |= {n: max(confidence[n], sure_as_corners(confidence, n)) for n in lids}
     outline = outline_of(space, fit, target) if shown.parted else None
     if outline is not None:
         positions |= {n: p for n, p in outline.corners.items() if n in positions}

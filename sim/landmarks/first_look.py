@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A first look at a scan with the landmarks given: a plausible head laid on it tells what they do not.
 
-Which eyes are shut, and what hangs out of the mouth and is no skin.
+Where lids are, and what hangs out of the mouth and is no skin.
 """
 
 from dataclasses import dataclass, field, replace

@@ -4,13 +4,9 @@
 import numpy as np
 
 from ..adapt.closest import Surface
-from ..adapt.lid_line import PLAIN, LidLine, lid_line
+from ..adapt.lid_line import PLAIN, SECOND, LidLine, lid_line
 from .shape_fit import ShapeFit, Told
 from .shape_space import ShapeSpace
-
-#: How deep the second creases of both eyes are against the deepest ones: from .48 on in 20 scans of open eyes, up to .26 in 15
-#: of shut ones.
-SECOND = 0.37
 
 
 def lid_lines(space: ShapeSpace, fit: ShapeFit, target: Surface) -> dict[str, LidLine]:
@@ -26,14 +22,19 @@ def shut_by_creases(lines: dict[str, LidLine]) -> bool | None:
     return float(np.mean([line.second / line.depth for line in lines.values()])) < SECOND
 
 
-def told_of_lids(space: ShapeSpace, fit: ShapeFit, lines: dict[str, LidLine]) -> Told:
-    """What the ``lines`` on which shut lids meet tell of the skin of ``fit``: how high its corners and margins are."""
+def told_of_lids(space: ShapeSpace, fit: ShapeFit, lines: dict[str, LidLine]) -> Told | None:
+    """How high the ``lines`` on which shut lids meet, side -> `LidLine`, tell corners and margins of ``fit`` to lie; None: they
+    are not seen plainly."""
     marks = space.landmarks(fit.points)
+    up = fit.matrix[:, 2] / np.linalg.norm(fit.matrix[:, 2])
     rows, places = [], []
     for side, line in lines.items():
+        if line.depth < PLAIN:
+            continue
         inner, way = marks[f"en_{side}"], marks[f"ex_{side}"] - marks[f"en_{side}"]
         for name in ("en", "ps", "pi", "ex"):
-            share = (marks[f"{name}_{side}"] - inner) @ way / (way @ way)
+            mark = marks[f"{name}_{side}"]
+            share = (mark - inner) @ way / (way @ way)
             rows.append(space.names.index(f"{name}_{side}"))
-            places.append(line.at(share))
-    return Told(space.corners[rows], space.weights[rows], np.array(places))
+            places.append(mark + (line.at(share) - mark) @ up * up)
+    return Told(space.corners[rows], space.weights[rows], np.array(places)) if rows else None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The lids of eyes of which the landmarks given say nothing, where a scan shows them: shut, or around an eyeball."""
+"""The lids of eyes of which the landmarks given say nothing, where a scan shows them, shut or open."""
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from .shape_space import ShapeSpace
 
 def lids_told(space: ShapeSpace, fit: ShapeFit, shown: Expression, target: Surface, given) -> dict[str, np.ndarray]:
     """Name -> (3,) mm: ``ps`` and ``pi`` of eyes whose lids are not among the landmarks ``given`` (name -> mm): where the lids
-    meet of eyes that are ``shown`` shut, and the margins of those that it shows around eyeballs.
+    meet of eyes that are ``shown`` shut, and the margins of those that are seen open.
 
     fit : a plausible head laid on the scan ``target``
     """

@@ -59,16 +59,14 @@ def open_lids(marks, matrix, target: Surface) -> dict[str, np.ndarray]:
             column = int(np.abs(SHARES - share).argmin())
             height = arch * bow()[column] + MARGIN[name]
             row = int(np.clip(np.rint((TOP - height) / STEP), 0, len(heights) - 1))
-            seen = np.flatnonzero(np.isfinite(depth[column]))
-            if len(seen) == 0:
-                continue
-            beyond = (
-                seen[seen <= row] if name == "ps" else seen[seen >= row]
-            )  # the lid, and not what lies between the lids
-            behind = depth[column, (beyond if len(beyond) else seen)[-1 if name == "ps" else 0]]
-            place = places[column, row] - scale * behind * forward
-            if abs((place - marks[f"{name}_{side}"]) @ forward) < NEAR * scale:
-                out[f"{name}_{side}"] = place
+            # The nearest of the lid, and not what lies between the lids.
+            lid = depth[column, row::-1] if name == "ps" else depth[column, row:]
+            if not np.isfinite(lid).any():
+                return {}
+            place = places[column, row] - scale * lid[np.isfinite(lid).argmax()] * forward
+            if abs((place - marks[f"{name}_{side}"]) @ forward) > NEAR * scale:
+                return {}
+            out[f"{name}_{side}"] = place
     return out
 
 
