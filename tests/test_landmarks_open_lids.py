@@ -99,9 +99,13 @@ def test_two_that_are_alike_may_be_noisy():
 
 def test_eyeballs_are_seen_between_open_lids_only(reference):
     target, marks = skin_seen(reference)
-    assert eyeballs_seen(marks, np.eye(3), target)
+    assert set(eyeballs_seen(marks, np.eye(3), target)) == {"l", "r"}
     turn = any_turn(0.8)
-    assert eyeballs_seen(*(turned(target, marks, turn)[1], turn, turned(target, marks, turn)[0]))
+    there = turned(target, marks, turn)
+    for side, ball in eyeballs_seen(there[1], turn, there[0]).items():
+        eye = reference.parts[f"eye_{side}"].vertices @ turn.T
+        front = eye[(eye @ -turn[:, 1]).argmax()]
+        assert ball.shows(front) and not ball.shows(there[1][f"ps_{side}"] - 3 * turn[:, 1])
     target, marks = skin_seen(reference, ("l", "r"))
     assert not eyeballs_seen(marks, np.eye(3), target)
 
@@ -113,7 +117,7 @@ def test_margins_of_open_lids_are_seen_around_eyeballs_and_holes(reference, eyeb
     rough = target.vertices + noise * np.random.default_rng(1).standard_normal(target.vertices.shape)
     turn = any_turn(1.2)
     target, there = turned(Surface(rough, target.triangles), marks, turn)
-    seen = open_lids(there, turn, target)
+    seen = open_lids(there, turn, target, eyeballs_seen(there, turn, target))
     assert set(seen) == set(LIDS)
     for name, place in seen.items():
         assert abs((np.linalg.solve(turn, place) - marks[name])[2]) < 1.8

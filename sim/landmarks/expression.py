@@ -64,8 +64,9 @@ def _fit_lids(space, target, fit, parted, told):
 
     laid = space.landmarks(fit.points), fit.matrix, target
     gaps = gaps_in_eyes(*laid)
-    known_open = gaps.show_open or eyeballs_seen(*laid)
-    seen = open_lids(*laid) if known_open else {}
+    eyeballs = eyeballs_seen(*laid)
+    known_open = gaps.show_open or bool(eyeballs)
+    seen = open_lids(*laid, eyeballs) if known_open else {}
     if seen:
         lids = told_of_open_lids(space, fit, seen)
         return (yield from changed(Expression(parted), fit.coefficients, lids)), Expression(parted, lids=seen)

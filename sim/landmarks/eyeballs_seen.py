@@ -27,6 +27,8 @@ RADIUS, STRAYS, SEEN = (7.5, 13.2), 0.065, 40.0
 #: against one, and mm between their places in their eyes. Noise of 0.2 mm makes eyeballs stray by .08; what else strays as
 #: little is not alike.
 ALIKE_RADIUS, ALIKE_STRAYS, ALIKE, ALIKE_PLACE = 11.0, 0.1, 0.12, 2.5
+#: Of the radius, before and behind the sphere: a lid stands before it, the white falls back from a cornea.
+BEFORE, BEHIND = 0.04, 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,24 +56,42 @@ class Ball:
         return bool(small and near and abs(self.radius / other.radius - 1) < ALIKE)
 
 
-def eyeballs_seen(marks, matrix, target: Surface) -> bool:
-    """Whether a scan shows the eyeball of one eye at least.
+@dataclass(frozen=True, eq=False)
+class Eyeball:
+    """middle (3,) mm in the scan, and radius mm."""
+
+    middle: np.ndarray
+    radius: float
+
+    def shows(self, points) -> np.ndarray:
+        """Which of the ``points`` (..., 3) mm of a scan are the eyeball's, the white beside the cornea included."""
+        before = (np.linalg.norm(points - self.middle, axis=-1) - self.radius) / self.radius
+        return (before > -BEHIND) & (before < BEFORE)
+
+
+def eyeballs_seen(marks, matrix, target: Surface) -> dict[str, Eyeball]:
+    """Side -> `Eyeball` of those that a scan shows.
 
     marks : name -> (3,) mm, about where ``en`` and ``ex`` lie; matrix (3, 3) turns and scales the reference into the scan
     """
     scale = np.cbrt(np.linalg.det(matrix))
     forward = -matrix[:, 1] / np.linalg.norm(matrix[:, 1])
     x, y = np.arange(-ASIDE, ASIDE + STEP / 2, STEP), np.arange(ACROSS, -ACROSS - STEP / 2, -STEP)
-    balls = []
+    balls, out = {}, {}
     for side in "lr":
         inner, outer = marks[f"en_{side}"], marks[f"ex_{side}"]
         along = outer - inner - (outer - inner) @ forward * forward
         along /= np.linalg.norm(along)
         up = np.cross(forward, along)
         up *= np.sign(up @ matrix[:, 2])
-        places = (inner + outer) / 2 + scale * (x[:, None] * along + y[:, None, None] * up)
-        balls.append(sphere_in(x, y, depths(target, places.reshape(-1, 3), forward).reshape(len(y), len(x)) / scale))
-    return any(ball is not None and ball.is_eyeball for ball in balls) or (all(balls) and balls[0].is_like(balls[1]))
+        middle = (inner + outer) / 2
+        places = middle + scale * (x[:, None] * along + y[:, None, None] * up)
+        ball = sphere_in(x, y, depths(target, places.reshape(-1, 3), forward).reshape(len(y), len(x)) / scale)
+        if ball is not None:
+            balls[side] = ball
+            out[side] = Eyeball(middle + scale * ball.middle @ np.stack([along, up, forward]), scale * ball.radius)
+    alike = len(balls) == 2 and balls["l"].is_like(balls["r"])
+    return {side: out[side] for side, ball in balls.items() if alike or ball.is_eyeball}
 
 
 def sphere_in(x, y, depth) -> Ball | None:

@@ -12,6 +12,7 @@ from ..adapt.closest import Surface
 from ..adapt.lid_line import BESIDE, DEEPEST, crease
 from ..relax.mouth_gap import depths
 from .eye_gaps import SOCKET, over_the_eye
+from .eyeballs_seen import Eyeball
 from .picked import MOVED
 from .shape_fit import ShapeFit, Told
 from .shape_space import ShapeSpace
@@ -22,17 +23,18 @@ ARCHES = np.arange(-8.0, 13.1, 0.25)  # mm: heights of arches in their middle
 BAND = 1.75  # mm inside and outside an arch
 USUAL, SPREAD, HEEDED = 9.0, 3.0, 0.25  # mm between open lids, and how much that counts against what is seen
 LEAST = 2.5  # mm between lids that are open
-PLAIN = 0.9  # of 4: difference between inside and outside of two arches on two eyes from which on they are margins
+PLAIN = 0.8  # of 4: difference between inside and outside of two arches on two eyes from which on they are margins
 NEAR = 6.0  # mm before or behind where a lid is taken to lie: what lies farther off is none
 MARGIN = {"ps": 0.5, "pi": -0.2}  # mm from the arch to where people pick the margin of the lid
 
 
-def open_lids(marks, matrix, target: Surface) -> dict[str, np.ndarray]:
+def open_lids(marks, matrix, target: Surface, eyeballs: dict[str, Eyeball] | None = None) -> dict[str, np.ndarray]:
     """Name -> (3,) mm: ``ps`` and ``pi`` of both eyes, on the margins of their lids; nothing if these are not seen plainly.
 
     Of a scan whose eyes are known to be open: other creases, on shut lids or of wrinkles, may look alike.
 
     marks : name -> (3,) mm, about where the eyes' landmarks lie; matrix (3, 3) turns and scales the reference into the scan
+    eyeballs : side -> `Eyeball` that the scan shows
     """
     scale = np.cbrt(np.linalg.det(matrix))
     forward = -matrix[:, 1] / np.linalg.norm(matrix[:, 1])
@@ -46,7 +48,10 @@ def open_lids(marks, matrix, target: Surface) -> dict[str, np.ndarray]:
         places = lines[:, None] + scale * heights[:, None] * up
         depth = depths(target, places.reshape(-1, 3), forward).reshape(places.shape[:2]) / scale
         depth[depth - over_the_eye(depth) > SOCKET] = np.nan
-        above, below = arches(crease(depth, int(BESIDE / STEP)) / DEEPEST)
+        worth = crease(depth, int(BESIDE / STEP)) / DEEPEST
+        if eyeballs and side in eyeballs:
+            worth[eyeballs[side].shows(places - scale * depth[..., None] * forward)] = 1.0
+        above, below = arches(worth)
         upper, lower, eyes[side] = upper + above, lower + below, (places, depth)
     pair = best_pair(upper, lower)
     if pair is None:
