@@ -86,6 +86,26 @@ def reference():
     return storage.load_head()
 
 
+@pytest.fixture(scope="session")
+def seen_skin(reference):
+    """``seen_skin(shut, eyeballs)`` -> the skin as a scanner sees it, the eyes on the sides ``shut`` shut, with the parts
+    ``eyeballs``, as a surface, and its landmarks."""
+    from headshop.sim.adapt.closest import Surface
+    from headshop.sim.adapt.rest import rest_of
+    from headshop.sim.adapt.shut_eyes import with_shut_eyes
+    from headshop.sim.mesh_subdivision import drawn
+
+    def make(shut=(), eyeballs=()):
+        head = with_shut_eyes(reference, shut)
+        target = Surface(drawn(head.skin.faces, head.skin.vertices), rest_of(reference).outer, smooth=2.0)
+        for name in eyeballs:
+            ball = reference.parts[name]
+            target = target.beside(drawn(ball.faces, ball.vertices), ball.triangles)
+        return target, head.landmark_positions()
+
+    return make
+
+
 @pytest.fixture
 def bad_scan(tmp_path):
     """``bad_scan(kind)`` -> path of a file: empty, text, missing, truncated, points, nan, one_triangle, whole."""

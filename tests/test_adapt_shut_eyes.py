@@ -125,13 +125,5 @@ def test_a_lower_lid_that_hangs_draws_the_eye_down_and_both_look_the_same_way(re
 def test_shut_eyes_of_somebody_else_are_told(reference, blinking):
     space = shape_space(reference)
     target = Surface(drawn(reference.skin.faces, blinking), rest_of(reference).outer)
-    fit = _run(fit_shape(space, target, Place(1.0, np.eye(3), np.zeros(3), 0.0)))
-    assert _run(fit_expression(space, target, fit))[1] == Expression(False, BOTH)
-
-
-def _run(work):
-    while True:
-        try:
-            next(work)
-        except StopIteration as end:
-            return end.value
+    fit = finish(fit_shape(space, target, Place(1.0, np.eye(3), np.zeros(3), 0.0)))
+    assert finish(fit_expression(space, target, fit))[1] == Expression(False, BOTH)

@@ -15,63 +15,42 @@ from headshop.sim.landmarks.pose_search import Pose
 from headshop.sim.landmarks.shape_fit import fit_shape
 from headshop.sim.landmarks.shape_space import shape_space
 from headshop.sim.mesh_subdivision import drawn
+from headshop.sim.progress import finish
 
 BOTH = ("l", "r")
 HERE = Pose(1.0, np.eye(3), np.zeros(3), 0.0)
 
 
-def drain(work):
-    """What the generator ``work`` returns."""
-    while True:
-        try:
-            next(work)
-        except StopIteration as end:
-            return end.value
-
-
-def scanned(reference, sides, without=lambda middle, marks: np.zeros(len(middle), dtype=bool)):
-    """The skin seen from outside, the eyes on ``sides`` shut, ``without`` the triangles of such a middle, and landmarks."""
-    head = with_shut_eyes(reference, sides)
-    marks, skin = head.landmark_positions(), drawn(head.skin.faces, head.skin.vertices)
-    seen = (head.groups["inner"] < 0.5)[head.skin.triangles].all(axis=1)
-    seen &= ~without(skin[head.skin.triangles].mean(axis=1), marks)
-    return Surface(skin, head.skin.triangles[seen], smooth=2.0), marks
-
-
-def slit(middle, marks):
-    """Triangles along the line where the lids meet, which a scanner loses."""
-    out = np.zeros(len(middle), dtype=bool)
+def with_slit(target, marks):
+    """``target`` without its triangles along the line where the lids meet, which a scanner loses."""
+    middle = target.vertices[target.triangles].mean(axis=1)
+    lost = np.zeros(len(middle), dtype=bool)
     for side in BOTH:
-        met, (inner, outer) = (
-            (marks[f"ps_{side}"] + marks[f"pi_{side}"]) / 2,
-            (marks[f"{c}_{side}"] for c in ("en", "ex")),
-        )
+        met, inner, outer = (marks[f"ps_{side}"] + marks[f"pi_{side}"]) / 2, marks[f"en_{side}"], marks[f"ex_{side}"]
         share = (middle - inner) @ (outer - inner) / ((outer - inner) @ (outer - inner))
         sag = (met - (inner + outer) / 2)[2] * 4 * share * (1 - share)
         height = (inner + share[:, None] * (outer - inner))[:, 2] + sag
-        out |= (np.abs(middle[:, 2] - height) < 0.9) & (share > 0) & (share < 1) & (middle[:, 1] < met[1] + 15)
-    return out
+        lost |= (np.abs(middle[:, 2] - height) < 0.9) & (share > 0) & (share < 1) & (middle[:, 1] < met[1] + 15)
+    return target.without(lost)
 
 
-def test_an_open_eye_gapes_and_a_shut_one_does_not(reference):
+def test_an_open_eye_gapes_and_a_shut_one_does_not(seen_skin):
     for sides in ((), BOTH):
-        target, marks = scanned(reference, sides)
+        target, marks = seen_skin(sides)
         assert gaps_in_eyes(marks, np.eye(3), target).show_open == (not sides)
 
 
-def test_the_bottom_of_an_empty_socket_is_no_eye(reference):
+def test_the_bottom_of_an_empty_socket_is_no_eye(seen_skin):
     """Made heads without eyeballs show their sockets, so no hole; the eyes are open all the same."""
-    skin, marks = reference.skin, reference.landmark_positions()
+    target, marks = seen_skin()
     middle = np.mean([marks[f"{name}_{side}"] for name in ("en", "ex") for side in BOTH], axis=0)
     wall = middle + np.array([[-60, 18, -25], [60, 18, -25], [60, 18, 25], [-60, 18, 25]])
-    seen = (reference.groups["inner"] < 0.5)[skin.triangles].all(axis=1)
-    points = drawn(skin.faces, skin.vertices)
-    triangles = np.concatenate([skin.triangles[seen], len(points) + np.array([[0, 1, 2], [0, 2, 3]])])
-    assert gaps_in_eyes(marks, np.eye(3), Surface(np.concatenate([points, wall]), triangles)).show_open
+    assert gaps_in_eyes(marks, np.eye(3), target.beside(wall, np.array([[0, 1, 2], [0, 2, 3]]))).show_open
 
 
-def test_a_slit_along_the_lids_shows_them_shut(reference):
-    target, marks = scanned(reference, BOTH, slit)
+def test_a_slit_along_the_lids_shows_them_shut(seen_skin):
+    target, marks = seen_skin(BOTH)
+    target = with_slit(target, marks)
     gaps = gaps_in_eyes(marks, np.eye(3), target)
     assert gaps.show_shut and gaps.slits > 0.5
     turn = np.linalg.qr(np.random.default_rng(2).standard_normal((3, 3)))[0]
@@ -105,8 +84,8 @@ def test_a_crease_is_followed_through_noise_and_holes():
     assert np.abs(best_way(worth) - place).max() <= 1
 
 
-def test_lids_that_meet_have_one_crease_where_they_do(reference):
-    target, marks = scanned(reference, BOTH)
+def test_lids_that_meet_have_one_crease_where_they_do(seen_skin):
+    target, marks = seen_skin(BOTH)
     lines = {side: lid_line(marks, side, target, np.eye(3)) for side in BOTH}
     assert shut_by_creases(lines) is True
     for side, line in lines.items():
@@ -116,16 +95,9 @@ def test_lids_that_meet_have_one_crease_where_they_do(reference):
         assert np.abs(line.at(share) - met)[2] < 1.0
 
 
-def test_margins_of_open_lids_have_two_creases(reference):
+def test_margins_of_open_lids_have_two_creases(seen_skin):
     """Eyeballs that are scanned leave no hole between open lids."""
-    skin = drawn(reference.skin.faces, reference.skin.vertices)
-    seen = (reference.groups["inner"] < 0.5)[reference.skin.triangles].all(axis=1)
-    points, triangles = [skin], [reference.skin.triangles[seen]]
-    for eye in ("eye_l", "eye_r"):
-        ball = reference.parts[eye]
-        triangles.append(ball.triangles + sum(map(len, points)))
-        points.append(ball.vertices)
-    target, marks = Surface(np.concatenate(points), np.concatenate(triangles)), reference.landmark_positions()
+    target, marks = seen_skin((), ("eye_l", "eye_r"))
     assert not gaps_in_eyes(marks, np.eye(3), target).show_open
     assert shut_by_creases({side: lid_line(marks, side, target, np.eye(3)) for side in BOTH}) is False
 
@@ -139,8 +111,8 @@ def test_smooth_skin_tells_nothing(reference):
     assert met_at(marks, "l", target, np.eye(3)) is None
 
 
-def test_the_crease_near_the_landmarks_of_shut_lids_is_theirs(reference):
-    target, marks = scanned(reference, BOTH)
+def test_the_crease_near_the_landmarks_of_shut_lids_is_theirs(seen_skin):
+    target, marks = seen_skin(BOTH)
     assert met_at(marks, "l", target, np.eye(3)) is not None
     assert met_at({n: p for n, p in marks.items() if n != "en_l"}, "l", target, np.eye(3)) is None
     away = marks | {"ps_l": marks["ps_l"] + [0, 0, 6], "pi_l": marks["pi_l"] + [0, 0, 6]}
@@ -150,11 +122,11 @@ def test_the_crease_near_the_landmarks_of_shut_lids_is_theirs(reference):
     assert met_at(marks, "l", target.without(nothing), np.eye(3)) is None
 
 
-def test_margins_of_shut_lids_rise_and_fall_with_the_crease(reference):
+def test_margins_of_shut_lids_rise_and_fall_with_the_crease(reference, seen_skin):
     """Where one landmark of a lid is picked 2 mm too high, the margins stay on the crease."""
     shut = with_shut_eyes(reference, BOTH)
     shut = shut.with_vertices({"skin": drawn(shut.skin.faces, shut.skin.vertices)})
-    target, marks = scanned(reference, BOTH)
+    target, marks = seen_skin(BOTH)
     high = marks | {name: marks[name] + [0, 0, 2.0] for name in ("ps_l", "pi_l")}
     rim = rims(shut)
     rows, alone, _ = lid_margins(shut, rim, high, np.eye(3), BOTH)
@@ -168,11 +140,12 @@ def test_margins_of_shut_lids_rise_and_fall_with_the_crease(reference):
     np.testing.assert_array_equal(alone[~left], guided[~left])
 
 
-def test_a_fit_to_shut_lids_lies_with_its_lids_on_the_line_and_shuts_no_farther(reference):
-    target, marks = scanned(reference, BOTH, slit)
+def test_a_fit_to_shut_lids_lies_with_its_lids_on_the_line_and_shuts_no_farther(reference, seen_skin):
+    target, marks = seen_skin(BOTH)
+    target = with_slit(target, marks)
     space = shape_space(reference)
-    fit = drain(fit_shape(space, target, HERE))
-    fit, shown = drain(fit_expression(space, target, fit))
+    fit = finish(fit_shape(space, target, HERE))
+    fit, shown = finish(fit_expression(space, target, fit))
     assert shown.shut == BOTH
     laid = space.landmarks(fit.points)
     for side in BOTH:
@@ -182,10 +155,10 @@ def test_a_fit_to_shut_lids_lies_with_its_lids_on_the_line_and_shuts_no_farther(
             assert abs(laid[f"{name}_{side}"] - marks[f"{name}_{side}"])[2] < 1.5
 
 
-def test_what_the_lines_tell_is_where_they_run(reference):
-    target, _ = scanned(reference, BOTH)
+def test_what_the_lines_tell_is_where_they_run(reference, seen_skin):
+    target, _ = seen_skin(BOTH)
     space = shape_space(reference)
-    fit = drain(fit_shape(space, target, HERE))
+    fit = finish(fit_shape(space, target, HERE))
     line = lid_line(space.landmarks(fit.points), "l", target, fit.matrix)
     told = told_of_lids(space, fit, {"l": line})
     assert told.places.shape == (4, 3)

@@ -5,11 +5,8 @@ import numpy as np
 import pytest
 
 from headshop.sim.adapt import build
-from headshop.sim.adapt.closest import Surface
-from headshop.sim.adapt.shut_eyes import with_shut_eyes
 from headshop.sim.landmarks.first_look import first_look
 from headshop.sim.mesh import Mesh
-from headshop.sim.mesh_subdivision import drawn
 from headshop.sim.progress import finish
 
 TWELVE = ("n", "prn", "sn", "en_l", "en_r", "ex_l", "ex_r", "ch_l", "ch_r", "gn", "t_l", "t_r")
@@ -26,15 +23,9 @@ def told_of(reference, target, given):
 
 
 @pytest.fixture(scope="module")
-def scans(reference):
+def scans(seen_skin):
     """Sides of shut eyes -> landmarks, and the skin as a scanner sees it."""
-    out = {}
-    for sides in ((), ("l", "r")):
-        head = with_shut_eyes(reference, sides)
-        seen = (head.groups["inner"] < 0.5)[head.skin.triangles].all(axis=1)
-        target = Surface(drawn(head.skin.faces, head.skin.vertices), head.skin.triangles[seen], smooth=2.0)
-        out[sides] = head.landmark_positions(), target
-    return out
+    return {sides: seen_skin(sides)[::-1] for sides in ((), ("l", "r"))}
 
 
 def test_lids_that_meet_are_told_and_where(reference, scans):

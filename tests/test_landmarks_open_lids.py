@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 
 from headshop.sim.adapt.closest import Surface
-from headshop.sim.adapt.shut_eyes import with_shut_eyes
 from headshop.sim.landmarks.expression import fit_expression
 from headshop.sim.landmarks.eyeballs_seen import ACROSS, ASIDE, STEP, eyeballs_seen, sphere_in
 from headshop.sim.landmarks.first_look import first_look
@@ -16,32 +15,11 @@ from headshop.sim.landmarks.open_lids import TOP as HIGHEST
 from headshop.sim.landmarks.pose_search import Pose
 from headshop.sim.landmarks.shape_fit import fit_shape
 from headshop.sim.landmarks.shape_space import shape_space
-from headshop.sim.mesh_subdivision import drawn
 from headshop.sim.progress import finish
 
 X, Y = np.arange(-ASIDE, ASIDE + STEP / 2, STEP), np.arange(ACROSS, -ACROSS - STEP / 2, -STEP)
+EYEBALLS = ("eye_l", "eye_r")
 LIDS = ("ps_l", "pi_l", "ps_r", "pi_r")
-
-
-def drain(work):
-    """What the generator ``work`` returns."""
-    while True:
-        try:
-            next(work)
-        except StopIteration as end:
-            return end.value
-
-
-def skin_seen(reference, sides=(), eyeballs=("eye_l", "eye_r")):
-    """The skin as a scanner sees it, the eyes on ``sides`` shut, with ``eyeballs``, and its landmarks."""
-    head = with_shut_eyes(reference, sides)
-    seen = (head.groups["inner"] < 0.5)[head.skin.triangles].all(axis=1)
-    points, triangles = [drawn(head.skin.faces, head.skin.vertices)], [head.skin.triangles[seen]]
-    for eye in eyeballs:
-        ball = reference.parts[eye]
-        triangles.append(ball.triangles + sum(map(len, points)))
-        points.append(drawn(ball.faces, ball.vertices))
-    return Surface(np.concatenate(points), np.concatenate(triangles), smooth=2.0), head.landmark_positions()
 
 
 def turned(target, marks, turn):
@@ -97,8 +75,8 @@ def test_two_that_are_alike_may_be_noisy():
     assert not one.is_like(sphere_in(X, Y, eye(radius=13.0, noise=0.4)))
 
 
-def test_eyeballs_are_seen_between_open_lids_only(reference):
-    target, marks = skin_seen(reference)
+def test_eyeballs_are_seen_between_open_lids_only(reference, seen_skin):
+    target, marks = seen_skin((), EYEBALLS)
     assert set(eyeballs_seen(marks, np.eye(3), target)) == {"l", "r"}
     turn = any_turn(0.8)
     there = turned(target, marks, turn)
@@ -106,14 +84,14 @@ def test_eyeballs_are_seen_between_open_lids_only(reference):
         eye = reference.parts[f"eye_{side}"].vertices @ turn.T
         front = eye[(eye @ -turn[:, 1]).argmax()]
         assert ball.shows(front) and not ball.shows(there[1][f"ps_{side}"] - 3 * turn[:, 1])
-    target, marks = skin_seen(reference, ("l", "r"))
+    target, marks = seen_skin(("l", "r"), EYEBALLS)
     assert not eyeballs_seen(marks, np.eye(3), target)
 
 
-@pytest.mark.parametrize("eyeballs", [("eye_l", "eye_r"), ("eye_l",), ()])
+@pytest.mark.parametrize("eyeballs", [EYEBALLS, EYEBALLS[:1], ()])
 @pytest.mark.parametrize("noise", [0.0, 0.2])
-def test_margins_of_open_lids_are_seen_around_eyeballs_and_holes(reference, eyeballs, noise):
-    target, marks = skin_seen(reference, (), eyeballs)
+def test_margins_of_open_lids_are_seen_around_eyeballs_and_holes(seen_skin, eyeballs, noise):
+    target, marks = seen_skin((), eyeballs)
     rough = target.vertices + noise * np.random.default_rng(1).standard_normal(target.vertices.shape)
     turn = any_turn(1.2)
     target, there = turned(Surface(rough, target.triangles), marks, turn)
@@ -123,8 +101,8 @@ def test_margins_of_open_lids_are_seen_around_eyeballs_and_holes(reference, eyeb
         assert abs((np.linalg.solve(turn, place) - marks[name])[2]) < 1.8
 
 
-def test_holes_in_brows_are_no_margins(reference):
-    target, marks = skin_seen(reference, (), ())
+def test_holes_in_brows_are_no_margins(seen_skin):
+    target, marks = seen_skin()
     middle = target.vertices[target.triangles].mean(axis=1)
     brow = (marks["ps_l"] + [0, 0, 9.0], marks["ps_r"] + [6, 0, 12.0])
     lost = np.min([np.linalg.norm((middle - place)[:, [0, 2]], axis=1) for place in brow], axis=0) < 4
@@ -142,13 +120,12 @@ def test_the_plainest_arches_lie_along_what_is_lacking():
     assert curve.max() == pytest.approx(1) and len(SHARES) == len(curve)
 
 
-def test_the_bottom_of_a_socket_is_no_lid(reference):
+def test_the_bottom_of_a_socket_is_no_lid(seen_skin):
     """Made heads without eyeballs show the socket's bottom between the lids."""
-    target, marks = skin_seen(reference, (), ())
+    target, marks = seen_skin()
     middle = np.mean([marks["en_l"], marks["en_r"]], axis=0)
     wall = middle + np.array([[-60, 18, -25], [60, 18, -25], [60, 18, 25], [-60, 18, 25]])
-    shown = np.concatenate([target.triangles, len(target.vertices) + np.array([[0, 1, 2], [0, 2, 3]])])
-    seen = open_lids(marks, np.eye(3), Surface(np.concatenate([target.vertices, wall]), shown))
+    seen = open_lids(marks, np.eye(3), target.beside(wall, np.array([[0, 1, 2], [0, 2, 3]])))
     assert all(np.linalg.norm(place - marks[name]) < 4 for name, place in seen.items()) and len(seen) == 4
 
 
@@ -160,19 +137,19 @@ def test_smooth_skin_has_no_margins(reference):
     assert open_lids(marks, np.eye(3), Surface(wall, np.array([[0, 1, 2], [0, 2, 3]]))) == {}
 
 
-def test_a_skin_is_not_laid_on_eyeballs(reference):
-    target, marks = skin_seen(reference)
+def test_a_skin_is_not_laid_on_eyeballs(reference, seen_skin):
+    target, marks = seen_skin((), EYEBALLS)
     space = shape_space(reference)
-    fit = drain(fit_shape(space, target, Pose(1.0, np.eye(3), np.zeros(3), 0.0)))
-    fit, shown = drain(fit_expression(space, target, fit))
+    fit = finish(fit_shape(space, target, Pose(1.0, np.eye(3), np.zeros(3), 0.0)))
+    fit, shown = finish(fit_expression(space, target, fit))
     assert shown.shut == () and set(shown.lids) == set(LIDS)
     laid = space.landmarks(fit.points)
     for name in shown.lids:
         assert abs(laid[name] - marks[name])[2] < 2.5
 
 
-def test_lids_around_eyeballs_are_told_where_none_are_given(reference):
-    target, marks = skin_seen(reference)
+def test_lids_around_eyeballs_are_told_where_none_are_given(reference, seen_skin):
+    target, marks = seen_skin((), EYEBALLS)
     twelve = ("n", "prn", "sn", "en_l", "en_r", "ex_l", "ex_r", "ch_l", "ch_r", "gn", "t_l", "t_r")
     told = finish(first_look(reference, target, {name: marks[name] for name in (*twelve, "pi_r")})).landmarks
     assert set(told) == {*twelve, "pi_r", "ps_l", "pi_l"}  # one lid of the right eye was given: the artist knows
@@ -180,9 +157,9 @@ def test_lids_around_eyeballs_are_told_where_none_are_given(reference):
 
 
 @pytest.mark.parametrize("width", [1.0, 2.0])
-def test_eyes_are_open_of_which_a_strip_in_the_shade_is_lost(reference, width):
+def test_eyes_are_open_of_which_a_strip_in_the_shade_is_lost(reference, seen_skin, width):
     """It looks like the slit between shut lids, but there is an eyeball below it."""
-    target, marks = skin_seen(reference)
+    target, marks = seen_skin((), EYEBALLS)
     middle, lost = target.vertices[target.triangles].mean(axis=1), np.zeros(len(target.triangles), dtype=bool)
     for side in "lr":
         inner, outer, top = (marks[f"{name}_{side}"] for name in ("en", "ex", "ps"))
@@ -191,6 +168,6 @@ def test_eyes_are_open_of_which_a_strip_in_the_shade_is_lost(reference, width):
         below = straight + (top - (inner + outer) / 2)[2] * 4 * share * (1 - share) - middle[:, 2]
         lost |= (below > 0) & (below < width) & (share > 0) & (share < 1) & (middle[:, 1] < top[1] + 15)
     space = shape_space(reference)
-    fit = drain(fit_shape(space, target, Pose(1.0, np.eye(3), np.zeros(3), 0.0)))
-    _, shown = drain(fit_expression(space, target.without(lost), fit))
+    fit = finish(fit_shape(space, target, Pose(1.0, np.eye(3), np.zeros(3), 0.0)))
+    _, shown = finish(fit_expression(space, target.without(lost), fit))
     assert shown.shut == ()

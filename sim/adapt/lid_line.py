@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..relax.mouth_gap import depths
 from .closest import Surface
+from .eye_frame import eye_frame
 
 #: Shares of the way from the inner to the outer corner of an eye at which creases are looked for, and its middle, where two
 #: of them are told apart.
@@ -47,14 +47,10 @@ def lid_line(marks, side: str, target: Surface, matrix) -> LidLine:
     marks : name -> (3,) mm, about where ``en`` and ``ex`` of the ``side`` lie
     matrix (3, 3) turns and scales the reference into the scan's place
     """
-    scale = np.cbrt(np.linalg.det(matrix))
-    forward = -matrix[:, 1] / np.linalg.norm(matrix[:, 1])
-    inner, outer = marks[f"en_{side}"], marks[f"ex_{side}"]
-    up = np.cross(forward, outer - inner)
-    up *= np.sign(up @ matrix[:, 2]) / np.linalg.norm(up)
+    eye = eye_frame(marks, side, matrix)
     heights = np.arange(FAR, -FAR - STEP / 2, -STEP)
-    places = (inner + COLUMNS[:, None] * (outer - inner))[:, None] + scale * heights[:, None] * up
-    depth = depths(target, places.reshape(-1, 3), forward).reshape(places.shape[:2]) / scale
+    places = eye.lines(COLUMNS, heights)
+    depth = eye.depth(target, places)
     worth = crease(depth, int(BESIDE / STEP))
     liked = worth - STRAY * (heights / FAR) ** 2
     columns = np.arange(len(COLUMNS))
@@ -65,7 +61,7 @@ def lid_line(marks, side: str, target: Surface, matrix) -> LidLine:
     seen = np.isfinite(found)
     behind = np.interp(COLUMNS, COLUMNS[seen], found[seen]) if seen.any() else np.zeros(len(COLUMNS))
     return LidLine(
-        places[columns, first] - scale * behind[:, None] * forward,
+        eye.behind(places[columns, first], behind),
         *(float(worth[columns, way][MIDDLE].mean()) for way in (first, second)),
     )
 
@@ -102,9 +98,9 @@ def met_at(given, side: str, target: Surface, matrix) -> LidLine | None:
     if any(f"{name}_{side}" not in given for name in ("en", "ps", "pi", "ex")):
         return None
     line = lid_line(given, side, target, matrix)
-    inner, way = given[f"en_{side}"], given[f"ex_{side}"] - given[f"en_{side}"]
+    eye = eye_frame(given, side, matrix)
     middle = (given[f"ps_{side}"] + given[f"pi_{side}"]) / 2
-    off = [place - line.at((place - inner) @ way / (way @ way)) for place in (inner, middle, inner + way)]
+    off = [place - line.at(eye.share(place)) for place in (eye.inner, middle, eye.inner + eye.way)]
     height = np.abs(off @ matrix[:, 2]) / (matrix[:, 2] @ matrix[:, 2])
     alone = line.depth >= PLAIN and line.second < SECOND * line.depth  # where nothing is seen, nothing is
     return line if alone and height.max() < NEAR else None

@@ -110,12 +110,11 @@ def outline_of(space: ShapeSpace, fit: ShapeFit, target: Surface) -> MouthOutlin
 
 def told_of_mouth(space: ShapeSpace, outline: MouthOutline) -> Told:
     """What the ``outline`` of a parted mouth tells of the skin: where its corners and the middle of its lips are."""
-    marks = [space.names.index(name) for name in outline.corners]
     middle = np.abs(space.points[space.lips[0], 0]).argmin()
     edges = np.array([lip[middle] for lip in space.lips])
-    corners = np.concatenate([space.corners[marks], np.repeat(edges[:, None], 3, axis=1)])
-    weights = np.concatenate([space.weights[marks], np.tile([1.0, 0.0, 0.0], (2, 1))])
-    return Told(corners, weights, np.array([*outline.corners.values(), outline.upper, outline.lower]))
+    corners, weights = np.repeat(edges[:, None], 3, axis=1), np.tile([1.0, 0.0, 0.0], (2, 1))
+    lips = Told(corners, weights, np.array([outline.upper, outline.lower]))
+    return Told.of(space, outline.corners).and_of(lips)
 
 
 def _third(work, before):

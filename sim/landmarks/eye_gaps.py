@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..adapt.closest import Surface
-from ..relax.mouth_gap import depths
+from ..adapt.eye_frame import eye_frame
 
 #: Shares of the way along an eye at which it is looked over, mm above and below, places looked at.
 EYE_LINES, ACROSS, LINE = np.linspace(0.25, 0.75, 11), 9.0, 60
@@ -47,16 +47,9 @@ def gaps_in_eyes(marks, matrix, target: Surface) -> EyeGaps:
 
     marks : name -> (3,) mm in the scan; matrix (3, 3) turns and scales the reference into it
     """
-    scale = np.cbrt(np.linalg.det(matrix))
     heights = np.linspace(ACROSS, -ACROSS, LINE)
-    lines = []
-    for side in "lr":
-        inner, outer = marks[f"en_{side}"], marks[f"ex_{side}"]
-        along = inner + EYE_LINES[:, None] * (outer - inner)
-        lines.append(along[:, None] + heights[:, None] * matrix[:, 2])
-    lines = np.concatenate(lines)
-    forward = -matrix[:, 1] / np.linalg.norm(matrix[:, 1])
-    depth = depths(target, lines.reshape(-1, 3), forward).reshape(len(lines), LINE) / scale
+    eyes = [eye_frame(marks, side, matrix) for side in "lr"]
+    depth = np.concatenate([eye.depth(target, eye.lines(EYE_LINES, heights)) for eye in eyes])
     lacking = np.isnan(depth) | (depth - over_the_eye(depth) > SOCKET) | crevices(depth)
     first, last = lacking.argmax(axis=1), LINE - 1 - lacking[:, ::-1].argmax(axis=1)
     extent = np.where(lacking.any(axis=1), (last - first + 1) * 2 * ACROSS / (LINE - 1), 0.0)

@@ -8,7 +8,7 @@ from scipy.ndimage import gaussian_filter
 from scipy.spatial import cKDTree
 
 from ..adapt.closest import Surface
-from ..relax.mouth_gap import depths
+from ..adapt.eye_frame import eye_frame
 
 ASIDE, ACROSS, STEP = (
     20.0,
@@ -74,22 +74,17 @@ def eyeballs_seen(marks, matrix, target: Surface) -> dict[str, Eyeball]:
 
     marks : name -> (3,) mm, about where ``en`` and ``ex`` lie; matrix (3, 3) turns and scales the reference into the scan
     """
-    scale = np.cbrt(np.linalg.det(matrix))
-    forward = -matrix[:, 1] / np.linalg.norm(matrix[:, 1])
     x, y = np.arange(-ASIDE, ASIDE + STEP / 2, STEP), np.arange(ACROSS, -ACROSS - STEP / 2, -STEP)
     balls, out = {}, {}
     for side in "lr":
-        inner, outer = marks[f"en_{side}"], marks[f"ex_{side}"]
-        along = outer - inner - (outer - inner) @ forward * forward
-        along /= np.linalg.norm(along)
-        up = np.cross(forward, along)
-        up *= np.sign(up @ matrix[:, 2])
-        middle = (inner + outer) / 2
-        places = middle + scale * (x[:, None] * along + y[:, None, None] * up)
-        ball = sphere_in(x, y, depths(target, places.reshape(-1, 3), forward).reshape(len(y), len(x)) / scale)
+        eye = eye_frame(marks, side, matrix)
+        middle = eye.inner + eye.way / 2
+        places = middle + eye.scale * (x[:, None] * eye.along + y[:, None, None] * eye.up)
+        ball = sphere_in(x, y, eye.depth(target, places))
         if ball is not None:
             balls[side] = ball
-            out[side] = Eyeball(middle + scale * ball.middle @ np.stack([along, up, forward]), scale * ball.radius)
+            axes = np.stack([eye.along, eye.up, eye.forward])
+            out[side] = Eyeball(middle + eye.scale * ball.middle @ axes, eye.scale * ball.radius)
     alike = len(balls) == 2 and balls["l"].is_like(balls["r"])
     return {side: out[side] for side, ball in balls.items() if alike or ball.is_eyeball}
 

@@ -4,6 +4,7 @@
 import numpy as np
 
 from ..adapt.closest import Surface
+from ..adapt.eye_frame import eye_frame
 from ..adapt.lid_line import PLAIN, SECOND, LidLine, lid_line
 from .shape_fit import ShapeFit, Told
 from .shape_space import ShapeSpace
@@ -27,14 +28,11 @@ def told_of_lids(space: ShapeSpace, fit: ShapeFit, lines: dict[str, LidLine]) ->
     are not seen plainly."""
     marks = space.landmarks(fit.points)
     up = fit.matrix[:, 2] / np.linalg.norm(fit.matrix[:, 2])
-    rows, places = [], []
+    told = {}
     for side, line in lines.items():
         if line.depth < PLAIN:
             continue
-        inner, way = marks[f"en_{side}"], marks[f"ex_{side}"] - marks[f"en_{side}"]
-        for name in ("en", "ps", "pi", "ex"):
-            mark = marks[f"{name}_{side}"]
-            share = (mark - inner) @ way / (way @ way)
-            rows.append(space.names.index(f"{name}_{side}"))
-            places.append(mark + (line.at(share) - mark) @ up * up)
-    return Told(space.corners[rows], space.weights[rows], np.array(places)) if rows else None
+        eye = eye_frame(marks, side, fit.matrix)
+        for name in (f"{base}_{side}" for base in ("en", "ps", "pi", "ex")):
+            told[name] = marks[name] + (line.at(eye.share(marks[name])) - marks[name]) @ up * up
+    return Told.of(space, told) if told else None

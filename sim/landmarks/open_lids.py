@@ -9,11 +9,11 @@ what a margin is. (Daugman 2004, *How iris recognition works*, finds lids in pic
 import numpy as np
 
 from ..adapt.closest import Surface
+from ..adapt.eye_frame import eye_frame
 from ..adapt.lid_line import BESIDE, DEEPEST, crease
-from ..relax.mouth_gap import depths
 from .eye_gaps import SOCKET, over_the_eye
 from .eyeballs_seen import Eyeball
-from .picked import MOVED
+from .picked import MOVED, moved
 from .shape_fit import ShapeFit, Told
 from .shape_space import ShapeSpace
 
@@ -36,40 +36,33 @@ def open_lids(marks, matrix, target: Surface, eyeballs: dict[str, Eyeball] | Non
     marks : name -> (3,) mm, about where the eyes' landmarks lie; matrix (3, 3) turns and scales the reference into the scan
     eyeballs : side -> `Eyeball` that the scan shows
     """
-    scale = np.cbrt(np.linalg.det(matrix))
-    forward = -matrix[:, 1] / np.linalg.norm(matrix[:, 1])
     heights = np.arange(TOP, BOTTOM - STEP / 2, -STEP)
-    upper, lower, eyes = 0.0, 0.0, {}
+    upper, lower, seen = 0.0, 0.0, {}
     for side in "lr":
-        inner, outer = marks[f"en_{side}"], marks[f"ex_{side}"]
-        up = np.cross(forward, outer - inner)
-        up *= np.sign(up @ matrix[:, 2]) / np.linalg.norm(up)
-        lines = inner + SHARES[:, None] * (outer - inner)
-        places = lines[:, None] + scale * heights[:, None] * up
-        depth = depths(target, places.reshape(-1, 3), forward).reshape(places.shape[:2]) / scale
+        eye = eye_frame(marks, side, matrix)
+        places = eye.lines(SHARES, heights)
+        depth = eye.depth(target, places)
         depth[depth - over_the_eye(depth) > SOCKET] = np.nan
         worth = crease(depth, int(BESIDE / STEP)) / DEEPEST
         if eyeballs and side in eyeballs:
-            worth[eyeballs[side].shows(places - scale * depth[..., None] * forward)] = 1.0
+            worth[eyeballs[side].shows(eye.behind(places, depth))] = 1.0
         above, below = arches(worth)
-        upper, lower, eyes[side] = upper + above, lower + below, (places, depth)
+        upper, lower, seen[side] = upper + above, lower + below, (eye, places, depth)
     pair = best_pair(upper, lower)
     if pair is None:
         return {}
     out = {}
-    for side, (places, depth) in eyes.items():
-        inner, way = marks[f"en_{side}"], marks[f"ex_{side}"] - marks[f"en_{side}"]
+    for side, (eye, places, depth) in seen.items():
         for name, arch in zip(("ps", "pi"), pair, strict=True):
-            share = (marks[f"{name}_{side}"] - inner) @ way / (way @ way) + MOVED[name][0] * scale / np.linalg.norm(way)
-            column = int(np.abs(SHARES - share).argmin())
+            mark = marks[f"{name}_{side}"]
+            picked = eye.share(mark) + MOVED[name][0] * eye.scale / np.linalg.norm(eye.way)
+            column = int(np.abs(SHARES - picked).argmin())
             height = arch * bow()[column] + MARGIN[name]
             row = int(np.clip(np.rint((TOP - height) / STEP), 0, len(heights) - 1))
             # The nearest of the lid, and not what lies between the lids.
             lid = depth[column, row::-1] if name == "ps" else depth[column, row:]
-            if not np.isfinite(lid).any():
-                return {}
-            place = places[column, row] - scale * lid[np.isfinite(lid).argmax()] * forward
-            if abs((place - marks[f"{name}_{side}"]) @ forward) > NEAR * scale:
+            place = eye.behind(places[column, row], lid[np.isfinite(lid).argmax()])
+            if not abs((place - mark) @ eye.forward) < NEAR * eye.scale:  # nor is one that nothing is seen of
                 return {}
             out[f"{name}_{side}"] = place
     return out
@@ -111,10 +104,4 @@ def best_pair(upper, lower) -> tuple[float, float] | None:
 
 def told_of_open_lids(space: ShapeSpace, fit: ShapeFit, seen: dict[str, np.ndarray]) -> Told:
     """What margins of lids that are ``seen``, name -> (3,) mm as people pick them, tell of the skin of ``fit``."""
-    rows, places = [], []
-    for name, place in seen.items():
-        base, side = name.split("_")
-        x, y, z = MOVED[base]
-        rows.append(space.names.index(name))
-        places.append(place - fit.matrix @ np.array([-x if side == "r" else x, y, z]))
-    return Told(space.corners[rows], space.weights[rows], np.array(places))
+    return Told.of(space, {name: place - fit.matrix @ moved(name) for name, place in seen.items()})

@@ -33,13 +33,18 @@ MOVED = {
 }
 
 
+def moved(name: str) -> np.ndarray:
+    """(3,) mm on a head of the reference's size from its landmark ``name`` to where people pick it."""
+    base, _, side = name.partition("_")
+    x, y, z = MOVED.get(base, (0.0, 0.0, 0.0))
+    return np.array([-x if side == "r" else x, y, z])
+
+
 def picked(space: ShapeSpace, fit: ShapeFit, target: Surface) -> dict[str, np.ndarray]:
     """Name -> (3,) mm, where somebody would pick each landmark: on the scan, where it is near."""
     out = {}
     for name, place in space.landmarks(fit.points).items():
-        base, _, side = name.partition("_")
-        x, y, z = MOVED.get(base, (0.0, 0.0, 0.0))
-        out[name] = place + fit.matrix @ np.array([-x if side == "r" else x, y, z])
+        out[name] = place + fit.matrix @ moved(name)
     names = list(out)
     found = target.closest(np.array([out[n] for n in names]), NEAR * fit.pose.scale)
     return {n: found.points[k] if found.found[k] else out[n] for k, n in enumerate(names)}

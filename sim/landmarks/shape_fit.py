@@ -63,6 +63,12 @@ class Told:
     weights: np.ndarray
     places: np.ndarray
 
+    @classmethod
+    def of(cls, space: ShapeSpace, landmarks: dict[str, np.ndarray]) -> "Told":
+        """What ``landmarks``, name -> (3,) mm on the scan, tell of the ``space``."""
+        rows = [space.names.index(name) for name in landmarks]
+        return cls(space.corners[rows], space.weights[rows], np.array(list(landmarks.values())))
+
     def and_of(self, other: "Told | None") -> "Told":
         """Both together."""
         if other is None:
