@@ -1,18 +1,23 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Whether eyes are open or shut is seen on the scan: by what it lacks there, and by the creases along the lids."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from headshop.sim.adapt import skin_fit
 from headshop.sim.adapt.closest import Surface
 from headshop.sim.adapt.lid_line import LidLine, best_way, crease, lid_line, met_at
 from headshop.sim.adapt.openings import lid_margins, rims
 from headshop.sim.adapt.shut_eyes import with_shut_eyes
-from headshop.sim.landmarks.expression import fit_expression
+from headshop.sim.anatomy.landmark_names import SKIN
+from headshop.sim.landmarks import expression
+from headshop.sim.landmarks.expression import fit_expression, shut_share
 from headshop.sim.landmarks.eye_gaps import EyeGaps, crevices, gaps_in_eyes
-from headshop.sim.landmarks.lid_creases import shut_by_creases, told_of_lids
+from headshop.sim.landmarks.lid_creases import lid_lines, shut_by_creases, told_of_lids
 from headshop.sim.landmarks.pose_search import Pose
-from headshop.sim.landmarks.shape_fit import fit_shape
+from headshop.sim.landmarks.shape_fit import CHANGE, Expression, Told, fit_shape
 from headshop.sim.landmarks.shape_space import shape_space
 from headshop.sim.mesh_subdivision import drawn
 from headshop.sim.progress import finish
@@ -166,3 +171,42 @@ def test_what_the_lines_tell_is_where_they_run(reference, seen_skin):
     assert (told.places[0] - line.at(0.0)) @ up == pytest.approx(0, abs=1e-6)  # how high
     np.testing.assert_allclose(np.cross(told.places[0] - marks["en_l"], up), 0, atol=1e-6)  # and not how deep
     assert told_of_lids(space, fit, {"l": LidLine(line.places, 0.3, 0.0)}) is None
+
+
+def test_shut_lids_are_shut_no_farther_than_they_meet(reference, seen_skin):
+    """A line that is told far below the lids draws the skin there down, and not the lids alone beyond where they meet."""
+    target, _ = seen_skin(BOTH)
+    space = shape_space(reference)
+    shut = Expression(False, BOTH)
+    fit = finish(fit_shape(space, target, HERE, expression=shut))
+    laid = space.landmarks(fit.points)
+    low = Told.of(space, {name: laid[name] - [0, 0, 8.0] for name in ("ps_l", "pi_l", "ps_r", "pi_r")})
+    fit = finish(fit_shape(space, target, HERE, CHANGE, fit.coefficients, expression=shut, told=low))
+    assert max(shut_share(space, fit).values()) < 1.25
+
+
+def test_lids_of_a_fit_go_to_the_line_where_they_are_seen_to_meet(reference, seen_skin, monkeypatch):
+    target, _ = seen_skin(BOTH)
+    space = shape_space(reference)
+    first = finish(fit_shape(space, target, HERE))
+    lines = lid_lines(space, first, target)
+    places = {}
+    for up in (0.0, 4.0):
+        told = {side: replace(line, places=line.places + [0, 0, up]) for side, line in lines.items()}
+        monkeypatch.setattr(expression, "lid_lines", lambda *_, told=told: told)
+        places[up] = space.landmarks(finish(fit_expression(space, target, first))[0].points)
+    assert (places[4.0]["ps_l"] - places[0.0]["ps_l"])[2] > 1.0
+
+
+def test_a_skin_is_fitted_with_its_shut_lids_on_the_crease(reference, seen_skin, monkeypatch):
+    target, marks = seen_skin(BOTH)
+    asked = []
+
+    def margins(*_):
+        asked.append(_[-1])
+        raise LookupError
+
+    monkeypatch.setattr(skin_fit, "lid_margins", margins)
+    with pytest.raises(LookupError):
+        finish(skin_fit.fit_skin(reference, target, {name: marks[name] for name in SKIN}))
+    assert set(asked[0]) == set(BOTH) and all(isinstance(line, LidLine) for line in asked[0].values())

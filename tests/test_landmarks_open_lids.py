@@ -1,12 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Eyeballs that a scan shows, and the margins of open lids, around eyeballs and around holes."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from headshop.sim.adapt.closest import Surface
+from headshop.sim.adapt.eye_frame import eye_frame
+from headshop.sim.landmarks import find
+from headshop.sim.landmarks import open_lids as open_lids_module
 from headshop.sim.landmarks.expression import fit_expression
-from headshop.sim.landmarks.eyeballs_seen import ACROSS, ASIDE, STEP, eyeballs_seen, sphere_in
+from headshop.sim.landmarks.eyeballs_seen import ACROSS, ASIDE, STEP, Eyeball, eyeballs_seen, sphere_in
 from headshop.sim.landmarks.first_look import first_look
 from headshop.sim.landmarks.open_lids import ARCHES, SHARES, arches, best_pair, bow, open_lids
 from headshop.sim.landmarks.open_lids import BOTTOM as LOWEST
@@ -15,6 +20,7 @@ from headshop.sim.landmarks.open_lids import TOP as HIGHEST
 from headshop.sim.landmarks.pose_search import Pose
 from headshop.sim.landmarks.shape_fit import fit_shape
 from headshop.sim.landmarks.shape_space import shape_space
+from headshop.sim.mesh import Mesh
 from headshop.sim.progress import finish
 
 X, Y = np.arange(-ASIDE, ASIDE + STEP / 2, STEP), np.arange(ACROSS, -ACROSS - STEP / 2, -STEP)
@@ -120,13 +126,66 @@ def test_the_plainest_arches_lie_along_what_is_lacking():
     assert curve.max() == pytest.approx(1) and len(SHARES) == len(curve)
 
 
-def test_the_bottom_of_a_socket_is_no_lid(seen_skin):
-    """Made heads without eyeballs show the socket's bottom between the lids."""
-    target, marks = seen_skin()
-    middle = np.mean([marks["en_l"], marks["en_r"]], axis=0)
-    wall = middle + np.array([[-60, 18, -25], [60, 18, -25], [60, 18, 25], [-60, 18, 25]])
-    seen = open_lids(marks, np.eye(3), target.beside(wall, np.array([[0, 1, 2], [0, 2, 3]])))
-    assert all(np.linalg.norm(place - marks[name]) < 4 for name, place in seen.items()) and len(seen) == 4
+def test_of_arches_as_plain_those_are_taken_that_are_as_far_apart_as_lids():
+    upper, lower = (np.isin(ARCHES, heights).astype(float) for heights in ([5.0], [-8.0, -4.0]))
+    assert best_pair(upper, lower) == (5.0, -4.0)
+
+
+def flush_eyes(marks, upper=5.0, lower=-3.5):
+    """Lids that rise gently from an eyeball, which is seen between arches of those heights, on both sides; and the eyeballs."""
+    shares, heights = np.linspace(-0.1, 1.1, 90), np.linspace(14, -12, 130)
+    target, eyeballs = None, {}
+    for side in "lr":
+        frame = eye_frame(marks, side, np.eye(3))
+        places = frame.lines(shares, heights)
+        eyeballs[side] = Eyeball(frame.inner + frame.way / 2 - 10 * frame.forward, 16.0)
+        curve = (4 * shares * (1 - shares))[:, None]
+        beyond = np.maximum(np.maximum(heights - upper * curve, lower * curve - heights), 0)
+        within = places + (np.clip(heights, lower * curve, upper * curve) - heights)[..., None] * frame.up
+        aside = within - eyeballs[side].middle
+        aside -= (aside @ frame.forward)[..., None] * frame.forward
+        out = np.sqrt(np.maximum(16.0**2 - (aside**2).sum(axis=2), 0)) + 0.35 * np.minimum(beyond, 5)
+        points = places + (out - (places - eyeballs[side].middle) @ frame.forward)[..., None] * frame.forward
+        points = points.reshape(-1, 3)
+        corner = np.arange(len(points)).reshape(len(shares), -1)
+        a, b, c, d = (part.ravel() for part in (corner[:-1, :-1], corner[1:, :-1], corner[1:, 1:], corner[:-1, 1:]))
+        triangles = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+        target = Surface(points, triangles) if target is None else target.beside(points, triangles)
+    return target, eyeballs
+
+
+def test_an_eyeball_makes_margins_plainer(reference, monkeypatch):
+    marks = reference.landmark_positions()
+    target, eyeballs = flush_eyes(marks)
+    plain = []
+
+    def pair(upper, lower):
+        plain.append((upper[:, None] + lower).max())
+        return best_pair(upper, lower)
+
+    monkeypatch.setattr(open_lids_module, "best_pair", pair)
+    open_lids(marks, np.eye(3), target)
+    seen = open_lids(marks, np.eye(3), target, eyeballs)
+    assert plain[1] > plain[0] + 1
+    for name, place in seen.items():
+        frame = eye_frame(marks, name[-1], np.eye(3))
+        share = frame.share(place)
+        height = (place - frame.inner - share * frame.way) @ frame.up
+        assert height == pytest.approx(4 * share * (1 - share) * {"ps": 5.0, "pi": -3.5}[name[:2]], abs=2)
+
+
+def test_landmarks_of_lids_are_where_these_are_seen(reference, seen_skin, monkeypatch):
+    target, _ = seen_skin((), EYEBALLS)
+    seen = np.array([30.0, -90.0, 20.0])
+
+    def told(*asked):
+        fit, shown = yield from fit_expression(*asked)
+        return fit, replace(shown, lids={"ps_l": seen})
+
+    monkeypatch.setattr(find, "fit_expression", told)
+    found = finish(find.find_landmarks(Mesh.from_triangles(target.vertices, target.triangles), reference))
+    np.testing.assert_array_equal(found.positions["ps_l"], seen)
+    assert "ps_l" not in found.mid_air
 
 
 def test_smooth_skin_has_no_margins(reference):
