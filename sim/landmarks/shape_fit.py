@@ -32,6 +32,9 @@ ALONG = 0.3  # weight of a pull along the surface against one across it
 BEND = 5.0  # how much better a place is that faces the same way, see `Surface.ranked`
 AGREE = 0.45  # cosine between the normals of skin and scan
 LEAST = 60  # points of the skin that must find the scan
+#: Weight of skin on which hair grows. Hair stands off it by centimetres, too many of them to be outliers, and would take the
+#: ears with it; a bald head is told as well by so little.
+HAIR = 0.05
 PATCH = 40.0  # mm²: so much of the surface says one thing
 TOLD = 1.0  # mm by which a place that is told may be wrong
 TILT = 0.05  # rad of turn, and fraction of size, that count as much as 1 standard deviation
@@ -125,6 +128,7 @@ def fit_shape(
     usual = sum((space.shut[side] for side in expression.shut), np.zeros(m))
     usual += expression.parted * space.parted
     looking = np.arange(len(space.points))[::every]
+    area = space.area / PATCH * np.where(space.hairy, HAIR, 1.0)
     for done, (variance, reach, width, noise) in enumerate(rounds):
         shaped = space.shaped(coefficients)
         points = scale * shaped @ turn.T + shift
@@ -136,7 +140,7 @@ def fit_shape(
         across = normals[use] @ turn
         gap = place - shaped[use]
         height = np.einsum("ij,ij->i", gap, across)
-        weight = every * trust[use] * space.area[use] / PATCH / (1 + (height / width) ** 2) ** 2 / noise**2
+        weight = every * trust[use] * area[use] / (1 + (height / width) ** 2) ** 2 / noise**2
         # Unknowns: a small turn about the face, a shift, a change of size, and the coefficients.
         rows = np.concatenate([_rigid(shaped[use] - middle), space.modes[use]], axis=2)
         right = gap + space.modes[use] @ coefficients

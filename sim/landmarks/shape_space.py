@@ -27,6 +27,7 @@ SEAL, LIPS = 0.8, 8.0  # mm that closed lips may part, one standard deviation, a
 SHUT = 0.7  # how far an eye is shut, one standard deviation
 HELD = 0.1  # how far an eye is shut of which it is known whether it is, one standard deviation
 OPENED = 1.2  # standard deviations of the jaw by which a mouth is open that is open at all
+NAPE = (15.0, 25.0)  # mm behind the hindmost point of the ear, and above the chin
 JAW_OPEN = 0.12  # rad, one standard deviation
 #: A smile moves the corners of the mouth outward, back and up, mm; one standard deviation.
 SMILE, SMILE_REACH = (4.0, 3.0, 4.0), 20.0
@@ -47,6 +48,7 @@ class ShapeSpace:
     triangles (t, 3) : of the points
     area (n,) mm² : surface around each point
     face, ear (n,) 0..1 : membership
+    hairy (n,) bool : skin on which hair grows: the scalp, and the nape behind the ears
     names (k,) : landmarks; corners (k, 3), weights (k, 3) : where they ride on the points
     """
 
@@ -62,6 +64,7 @@ class ShapeSpace:
     area: np.ndarray
     face: np.ndarray
     ear: np.ndarray
+    hairy: np.ndarray
     names: tuple[str, ...]
     corners: np.ndarray
     weights: np.ndarray
@@ -133,10 +136,17 @@ def shape_space(head: Head) -> ShapeSpace:
         area,
         face,
         ear,
+        (group("scalp") > 0.5) | _nape(points, landmarks) & (np.maximum(face, ear) < 0.1),
         tuple(head.landmarks.names[k] for k in marks),
         index[head.landmarks.corners[marks]],
         head.landmarks.weights[marks],
     )
+
+
+def _nape(points, landmarks):
+    """(n,) bool, of a skin's ``points`` (n, 3) mm those behind the ears, from where the hair of the nape begins."""
+    behind, above = landmarks["pa_l"][1] + NAPE[0], landmarks["gn"][2] + NAPE[1]
+    return (points[:, 1] > behind) & (points[:, 2] > above)
 
 
 def _principal(modes, area):
