@@ -28,6 +28,7 @@ from .thin_plate_spline import ThinPlateSpline, similarity
 
 STIFF = tuple(f"{x}_{s}" for x in ("lid_upper", "lid_lower", "nostril") for s in ("l", "r"))
 CARRIED = 60.0  # smoothing of the first warp at a landmark that was not given, mm
+GUESSED = 10.0  # the same at one that is guessed
 PICKED = 1.0  # the same at a given one, per mm of its uncertainty
 LID_MARKS = ("ps_l", "ps_r", "pi_l", "pi_r")
 LOOSE = 20.0  # how much less the shape of a lid's margin counts in an eye that is as open as the reference's
@@ -79,15 +80,17 @@ def fit_skin(
     given: dict[str, np.ndarray],
     lips: dict[str, np.ndarray] | None = None,
     found: Collection[str] = (),
+    guessed: dict[str, np.ndarray] | None = None,
 ) -> Work:
     """Work returning the `SkinFit` of ``reference`` to the scan ``target`` with the landmarks ``given`` (mm).
 
     lips : name -> (3,) mm, about where landmarks of lips are that are known to be apart, if only a little
     found : names of those given that nobody picked; the data around them count for more
+    guessed : name -> (3,) mm, about where others are; the skin begins there, and data may take it elsewhere
 
     It is the surface drawn of the skin, the limit of its subdivision, that is laid on the scan.
     """
-    return on_one_thread(_fitting(reference, target, given, lips, found))
+    return on_one_thread(_fitting(reference, target, given, lips, found, guessed or {}))
 
 
 def _fitting(
@@ -96,6 +99,7 @@ def _fitting(
     given: dict[str, np.ndarray],
     apart: dict[str, np.ndarray] | None,
     found: Collection[str],
+    guessed: dict[str, np.ndarray],
 ) -> Work:
     yield Progress(0.0, "Looking at lids and lips")
     data = target.coarser()
@@ -110,11 +114,14 @@ def _fitting(
     names = [name for name in SKIN if name in reference.landmarks.names]
     rows = landmark_rows(reference.landmarks, names, n)
     marks = rows @ skin.vertices
-    landmarks = complete_positions(dict(zip(names, marks, strict=True)), given)
+    landmarks = complete_positions(dict(zip(names, marks, strict=True)), given) | {
+        name: place for name, place in guessed.items() if name in names and name not in given
+    }
     goal = np.array([landmarks[name] for name in names])
     known = np.array([name in given for name in names])
     loose = np.array([name in found and name.partition("_")[0] not in FOLDS for name in names])
     give = np.where(known, [PICKED * sigma(name) for name in names], CARRIED)
+    give[[name in guessed and name not in given for name in names]] = GUESSED
     rim = rims(reference)
     turn, shift = similarity(marks, goal)
     lines = {side: met_at(given, side, target, turn) for side in closed}

@@ -24,6 +24,7 @@ from .shape_fit import NoFaceError, fit_shape
 from .shape_space import shape_space
 
 LOOKING = "Looking at lids and lips"
+SKULL = ("v", "op", "eu_l", "eu_r")
 FEWEST = 4  # landmarks that tell where the head is
 
 
@@ -31,7 +32,8 @@ FEWEST = 4  # landmarks that tell where the head is
 class FirstLook:
     """landmarks : name -> (3,) mm, those given and those of lids that are seen; lips : about where their landmarks are if
     they are parted, if only a little, or None; target : the scan without what the lips hold; held_mm2 : how much of it that
-    is; filled : with skin behind it, as it probably is; hidden (k,) : vertices of the reference's skin that make that up."""
+    is; filled : with skin behind it, as it probably is; hidden (k,) : vertices of the reference's skin that make that up;
+    skull : name -> (3,) mm, about where landmarks of the skull are that were not given."""
 
     landmarks: dict[str, np.ndarray]
     target: Surface
@@ -39,6 +41,7 @@ class FirstLook:
     lips: dict[str, np.ndarray] | None = None
     held_mm2: float = 0.0
     hidden: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
+    skull: dict[str, np.ndarray] = field(default_factory=dict)
 
     def seen_only(self, fit: SkinFit) -> SkinFit:
         """A ``fit`` to the ``filled`` scan, as one to what the scan shows."""
@@ -69,10 +72,11 @@ def first_look(reference: Head, target: Surface, given: dict[str, np.ndarray], k
     landmarks = given | lids_told(space, fit, shown, coarse, given)
     laid = space.landmarks(fit.points)
     lips = {name: laid[name] for name in MARKS} if shown.parted else None
+    skull = {name: laid[name] for name in SKULL if name in laid and name not in given}
     if keep_held:
-        return FirstLook(landmarks, target, target, lips)
+        return FirstLook(landmarks, target, target, lips, skull=skull)
     held = held_by_lips(space, fit, target)
     left = target.without(held)
     hidden = hidden_skin(space, fit, target.vertices[target.triangles[held].ravel()], left)
     filled = with_hidden_skin(space, fit, hidden, left)
-    return FirstLook(landmarks, left, filled, lips, float(target.area[held].sum()), space.vertices[hidden])
+    return FirstLook(landmarks, left, filled, lips, float(target.area[held].sum()), space.vertices[hidden], skull)

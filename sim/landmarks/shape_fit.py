@@ -35,6 +35,9 @@ LEAST = 60  # points of the skin that must find the scan
 #: Weight of skin on which hair grows. Hair stands off it by centimetres, too many of them to be outliers, and would take the
 #: ears with it; a bald head is told as well by so little.
 HAIR = 0.05
+#: mm off such skin from which on it is hair; depth of hair and its standard deviation, mm.
+BALD, DEEP = 6.0, (10.0, 10.0)
+STANDS_OFF = 35.0  # mm: so far hair may
 PATCH = 40.0  # mm²: so much of the surface says one thing
 TOLD = 1.0  # mm by which a place that is told may be wrong
 TILT = 0.05  # rad of turn, and fraction of size, that count as much as 1 standard deviation
@@ -132,7 +135,10 @@ def fit_shape(
     for done, (variance, reach, width, noise) in enumerate(rounds):
         shaped = space.shaped(coefficients)
         points = scale * shaped @ turn.T + shift
-        found, trust, normals = pairs(space, points, target, reach * scale, looking)
+        found, trust, normals = pairs(space, points, target, reach * scale, looking[~space.hairy[looking]])
+        above = pairs(space, points, target, max(reach, STANDS_OFF) * scale, looking[space.hairy[looking]])
+        for whole, part in zip((found, trust, normals), above, strict=True):
+            whole[space.hairy] = part[space.hairy]
         use = np.flatnonzero(trust > 0)
         if len(use) * every < LEAST:
             raise NoFaceError
@@ -141,6 +147,10 @@ def fit_shape(
         gap = place - shaped[use]
         height = np.einsum("ij,ij->i", gap, across)
         weight = every * trust[use] * area[use] / (1 + (height / width) ** 2) ** 2 / noise**2
+        # What stands off hairy skin is hair of some depth, whatever the round.
+        hair = space.hairy[use] & (height > BALD)
+        weight[hair] = every * (trust * area)[use][hair] / DEEP[1] ** 2
+        gap[hair] -= DEEP[0] * across[hair]
         # Unknowns: a small turn about the face, a shift, a change of size, and the coefficients.
         rows = np.concatenate([_rigid(shaped[use] - middle), space.modes[use]], axis=2)
         right = gap + space.modes[use] @ coefficients
