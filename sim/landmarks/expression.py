@@ -10,9 +10,11 @@ from ..relax.mouth_gap import lip_edges
 from .eye_gaps import EyeGaps, gaps_in_eyes
 from .eyeballs_seen import eyeballs_seen
 from .lid_creases import lid_lines, shut_by_creases, told_of_lids
+from .lip_line import LipLine, lip_line
 from .mouth_outline import MouthOutline, mouth_outline
 from .open_lids import open_lids, told_of_open_lids
-from .shape_fit import CHANGE, Expression, ShapeFit, Told, fit_shape
+from .picked import moved
+from .shape_fit import CHANGE, REST, Expression, ShapeFit, Told, fit_shape
 from .shape_space import ShapeSpace
 
 AROUND_EYE = 22.0  # mm
@@ -42,8 +44,8 @@ def fit_expression(space: ShapeSpace, target: Surface, fit: ShapeFit):
 
 def _fit_lips(space, target, fit):
     """As `fit_expression`; returns the `ShapeFit`, whether its lips are parted, and what is `Told` of them."""
-    moved = fit.coefficients + space.parted
-    free = yield from _third(fit_shape(space, target, fit.pose, CHANGE, moved, 1, Expression(True)), 0)
+    opened = fit.coefficients + space.parted
+    free = yield from _third(fit_shape(space, target, fit.pose, CHANGE, opened, 1, Expression(True)), 0)
     outline = outline_of(space, free, target)
     told = None if outline is None else told_of_mouth(space, outline)
     if told is not None:
@@ -52,7 +54,14 @@ def _fit_lips(space, target, fit):
     gap = told is not None or lips_ajar(space, free, target)
     mouth = about_mouth(space)
     parted = gap and cost(space, free, mouth) < NO_WORSE * cost(space, fit, mouth)
-    return (free, True, told) if parted else (fit, False, None)
+    if parted:
+        return free, True, told
+    line = line_of(space, fit, target)
+    if line is None:
+        return fit, False, None
+    told = told_of_lips(space, fit, line)
+    fit = yield from _third(fit_shape(space, target, fit.pose, CHANGE, fit.coefficients, 1, REST, told), 1)
+    return fit, False, told
 
 
 def _fit_lids(space, target, fit, parted, told):
@@ -78,10 +87,10 @@ def _fit_lids(space, target, fit, parted, told):
         wide = Expression(parted, wide=True)
         return (yield from changed(wide, fit.coefficients)), wide
     both = Expression(parted, ("l", "r"))
-    moved = fit.coefficients + sum((1 - share[side]) * space.shut[side] for side in both.shut)
+    shutting = fit.coefficients + sum((1 - share[side]) * space.shut[side] for side in both.shut)
     if shut:
-        return (yield from changed(both, moved, told_of_lids(space, fit, lines))), both
-    rival, about = (yield from changed(both, moved)), eyes(space)
+        return (yield from changed(both, shutting, told_of_lids(space, fit, lines))), both
+    rival, about = (yield from changed(both, shutting)), eyes(space)
     better = min(share.values()) > SHUT or cost(space, rival, about) < REASON * cost(space, fit, about)
     return (rival, both) if better else (fit, Expression(parted))
 
@@ -106,6 +115,16 @@ def shut_share(space: ShapeSpace, fit: ShapeFit) -> dict[str, float]:
 def outline_of(space: ShapeSpace, fit: ShapeFit, target: Surface) -> MouthOutline | None:
     """`mouth_outline` of the scan, looked for where the lips of ``fit`` are."""
     return mouth_outline(target, space.landmarks(fit.points), -fit.pose.turn[:, 1], fit.pose.scale)
+
+
+def line_of(space: ShapeSpace, fit: ShapeFit, target: Surface) -> LipLine | None:
+    """`lip_line` of the scan, looked for where the lips of ``fit`` are."""
+    return lip_line(target, space.landmarks(fit.points), -fit.pose.turn[:, 1], fit.pose.scale)
+
+
+def told_of_lips(space: ShapeSpace, fit: ShapeFit, line: LipLine) -> Told:
+    """What the ``line`` of closed lips tells of the skin laid on the scan by ``fit``: where its corners and its middle are."""
+    return Told.of(space, {name: place - fit.matrix @ moved(name) for name, place in line.marks.items()})
 
 
 def told_of_mouth(space: ShapeSpace, outline: MouthOutline) -> Told:

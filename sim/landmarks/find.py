@@ -11,7 +11,7 @@ from ..cylindrical.second_opinion import weighed
 from ..mesh import Mesh
 from ..progress import Progress, Work, portion
 from .confidence import judge, judge_together, like_ears, sure_as_corners
-from .expression import fit_expression, meeting_lids, outline_of
+from .expression import fit_expression, line_of, meeting_lids, outline_of
 from .picked import picked
 from .placed_face import place_face, run
 from .pose_search import LOOKING
@@ -83,9 +83,10 @@ def find_landmarks(mesh: Mesh, reference: Head | None = None, unit_scales=(1.0,)
     positions |= lids
     mid_air = tuple(n for n in mid_air if n not in lids)
     confidence |= {n: max(confidence[n], sure_as_corners(confidence, n)) for n in lids}
-    outline = outline_of(space, fit, target) if shown.parted else None
-    if outline is not None:
-        positions |= {n: p for n, p in outline.corners.items() if n in positions}
+    mouth = (outline_of if shown.parted else line_of)(space, fit, target)
+    if mouth is not None:
+        positions |= {n: p for n, p in mouth.marks.items() if n in positions}
+        mid_air += ("sto",) if shown.parted and "sto" in positions and "sto" not in mid_air else ()
     rest = reference.landmark_positions()
     confidence = judge_together(positions, confidence, mid_air, rest, shown, like_ears(space, fit))
     return FoundLandmarks(positions, confidence, mid_air, missing, scale, misfit)

@@ -32,6 +32,11 @@ class MouthOutline:
     upper: np.ndarray
     lower: np.ndarray
 
+    @property
+    def marks(self) -> dict[str, np.ndarray]:
+        """Name -> (3,) mm: the corners, and ``sto`` in mid-air half-way between the lips."""
+        return self.corners | {"sto": (self.upper + self.lower) / 2}
+
 
 def mouth_outline(target: Surface, marks, forward, scale: float = 1.0) -> MouthOutline | None:
     """The `MouthOutline` of a scan whose lips are parted; None: there is no gap.
@@ -59,19 +64,26 @@ def mouth_outline(target: Surface, marks, forward, scale: float = 1.0) -> MouthO
 def looked_at(target: Surface, marks, forward, scale: float):
     """Columns of places (c, r, 3) mm before the mouth, from its right to its left, from above downward, and how deep (c, r)
     the scan lies behind them, in mm of the reference."""
+    aside = scale * np.arange(-WIDE, WIDE + ASIDE / 2, ASIDE)
+    arch, up = mouth_arch(marks, "ls", forward, aside)
+    above = np.arange(scale * ABOVE, (marks["pg"] - marks["ls"]) @ up, -scale * DOWN)
+    places = arch[:, None] + above[:, None] * up
+    depth = depths(target, places.reshape(-1, 3), forward).reshape(places.shape[:2])
+    return places, depth / scale
+
+
+def mouth_arch(marks, middle: str, forward, aside):
+    """Places (c, 3) mm ``aside`` (c,) mm to the left of the mark ``middle`` of a mouth, on an arch, since its corners lie
+    farther back, and the unit vector (3,) upward across it.
+
+    marks, forward : as in `mouth_outline`
+    """
     across = marks["ch_l"] - marks["ch_r"]
     across = across - across @ forward * forward
     half = np.linalg.norm(across) / 2
     across /= 2 * half
-    up = np.cross(forward, across)
-    aside = scale * np.arange(-WIDE, WIDE + ASIDE / 2, ASIDE)
-    above = np.arange(scale * ABOVE, (marks["pg"] - marks["ls"]) @ up, -scale * DOWN)
-    # The corners lie farther back than the middle: the columns stand on an arch.
-    back = ((marks["ch_l"] + marks["ch_r"]) / 2 - marks["ls"]) @ forward * (aside / half) ** 2
-    arch = marks["ls"] + aside[:, None] * across + back[:, None] * forward
-    places = arch[:, None] + above[:, None] * up
-    depth = depths(target, places.reshape(-1, 3), forward).reshape(places.shape[:2])
-    return places, depth / scale
+    back = ((marks["ch_l"] + marks["ch_r"]) / 2 - marks[middle]) @ forward * (aside / half) ** 2
+    return marks[middle] + aside[:, None] * across + back[:, None] * forward, np.cross(forward, across)
 
 
 def middle_gap(depth):

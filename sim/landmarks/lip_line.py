@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The line on which closed lips meet: a crease, or a slit that a scanner lost, as long as the mouth is wide.
+
+No shape of a neutral head tells how wide a mouth is, but the crease ends at its corners. It is followed from the middle
+as the line of shut lids is (`sim.adapt.lid_line`), and ends where what it is deeper than the skin beside it adds up to most.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import uniform_filter1d
+
+from ..adapt.closest import Surface
+from ..adapt.lid_line import best_way, crease
+from ..relax.mouth_gap import depths
+from ..relax.smile import CORNERS
+from .mouth_outline import NARROW, NEAR, mouth_arch
+
+ASIDE, STEP = 0.5, 0.25  # mm from column to column, and from place to place in one
+WIDE, FAR = 44.0, 9.0  # mm to either side of the middle, and above and below where lips are taken to meet
+BESIDE = 2.0  # mm above and below from which the crease is seen to be deeper
+STRAY = 0.3  # mm of depth that it must have more where it is `FAR` off
+ALONG = 9  # columns over which it is averaged
+#: mm deep that the crease is between lips, and less beyond their corners: the middle of 26 mouths of which both are known,
+#: from .5, where wrinkles go on with it, to 1, where thin lips end too soon.
+PLAIN = 0.75
+MIDDLE = 10.0  # mm to either side of the middle where it must be as deep
+AROUND = 4  # columns beside a corner that tell how deep it lies
+
+
+@dataclass(frozen=True, eq=False)
+class LipLine:
+    """corners : ``ch_l`` and ``ch_r`` -> (3,) mm, where the line ends; middle (3,) mm : of the line."""
+
+    corners: dict[str, np.ndarray]
+    middle: np.ndarray
+
+    @property
+    def marks(self) -> dict[str, np.ndarray]:
+        """Name -> (3,) mm: the corners, and ``sto`` in the middle of the line."""
+        return self.corners | {"sto": self.middle}
+
+
+def lip_line(target: Surface, marks, forward, scale: float = 1.0) -> LipLine | None:
+    """The `LipLine` of a scan with closed lips; None: it is not seen plainly.
+
+    marks : name -> (3,) mm, where about ``sto``, ``ch_l`` and ``ch_r`` lie; forward : (3,) unit vector, out of the face;
+    scale : mm on the scan per mm of the reference
+    """
+    aside = np.arange(-WIDE, WIDE + ASIDE / 2, ASIDE)
+    heights = np.arange(FAR, -FAR - STEP / 2, -STEP)
+    arch, up = mouth_arch(marks, "sto", forward, scale * aside)
+    places = arch[:, None] + scale * heights[:, None] * up
+    depth = depths(target, places.reshape(-1, 3), forward).reshape(places.shape[:2]) / scale
+    worth = uniform_filter1d(crease(depth, int(BESIDE / STEP)), ALONG, axis=0)
+    way = best_way(worth - STRAY * (heights / FAR) ** 2)
+    columns = np.arange(len(aside))
+    worth, depth, places = worth[columns, way], depth[columns, way], places[columns, way]
+    if worth[np.abs(aside) < MIDDLE].mean() < PLAIN:
+        return None
+    ends = line_ends(worth)
+    behind = [_typical(depth[max(k - AROUND, 0) : k + AROUND + 1]) for k in (*ends, len(aside) // 2)]
+    seen = places[[*ends, len(aside) // 2]] - scale * np.array(behind)[:, None] * forward
+    found = target.closest(seen[:2], NEAR * scale)
+    if not found.found.all() or np.linalg.norm(np.subtract(*found.points)) < NARROW * scale:
+        return None
+    return LipLine(dict(zip(CORNERS, found.points, strict=True)), seen[2])
+
+
+def line_ends(worth) -> tuple[int, int]:
+    """The last columns, to the left and to the right of the middle, of a line as deep as ``worth`` (k,) mm, see `lip_line`.
+
+    Each is where what the line has more than `PLAIN` adds up to most: neither a weak place nor a speck beyond ends it.
+    """
+    middle = len(worth) // 2
+    left = middle + np.cumsum(worth[middle:] - PLAIN).argmax()
+    right = middle - np.cumsum(worth[middle::-1] - PLAIN).argmax()
+    return int(left), int(right)
+
+
+def _typical(depth) -> float:
+    """The median of a ``depth`` (k,) where it is known; 0 where it is nowhere."""
+    known = depth[np.isfinite(depth)]
+    return float(np.median(known)) if len(known) else 0.0

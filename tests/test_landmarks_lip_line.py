@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The line of closed lips: it is as long as the mouth is wide, which no shape of a neutral head tells."""
+
+import json
+
+import numpy as np
+import pytest
+
+from headshop.sim.adapt.closest import Surface
+from headshop.sim.landmarks.find import find_landmarks
+from headshop.sim.landmarks.lip_line import PLAIN, line_ends, lip_line
+from headshop.sim.progress import finish
+from headshop.sim.scan.clean import clean_scan
+from headshop.sim.scan.ply import read_ply
+
+HALF, RISE = 22.0, 3.0  # mm: half the mouth's width, how far its corners are raised
+FORWARD = np.array([0.0, -1.0, 0.0])
+
+
+def _face(deep=2.0, slit=False, noise=0.0, speck=False):
+    """A rounded surface with a crease in it like that between closed lips, ``deep`` mm, or a ``slit`` without data; with
+    ``noise`` mm, and a ``speck`` without data 12 mm beyond the left corner."""
+    x, z = np.meshgrid(np.arange(-60, 60.1, 0.5), np.arange(-40, 40.1, 0.5))
+    high = z - RISE * (x / HALF) ** 2
+    along = np.clip((HALF - np.abs(x)) / 3, 0, 1)
+    y = (
+        x**2 / 40
+        + deep * along * np.exp(-((high / 1.0) ** 2))
+        + noise * np.random.default_rng(3).standard_normal(x.shape)
+    )
+    points = np.stack([x, y, z], axis=2).reshape(-1, 3)
+    k = np.arange(x.size).reshape(x.shape)
+    a, b, c, d = k[:-1, :-1].ravel(), k[:-1, 1:].ravel(), k[1:, 1:].ravel(), k[1:, :-1].ravel()
+    triangles = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
+    across, _, up = points[triangles].mean(axis=1).T
+    gone = slit & (np.abs(up - RISE * (across / HALF) ** 2) < 0.8) & (np.abs(across) < HALF)
+    gone |= speck & (np.hypot(across - HALF - 12, up - RISE * ((HALF + 12) / HALF) ** 2) < 1.5)
+    return Surface(points, triangles[~gone])
+
+
+def _guess(wide=0.0, high=0.0):
+    """Landmarks as a first fit might have them: the corners so much too far out, all of them so much too high."""
+    half = HALF + wide
+    places = {"sto": (0, 0, high), "ch_l": (half, half**2 / 40, high), "ch_r": (-half, half**2 / 40, high)}
+    return {name: np.array(place, dtype=float) for name, place in places.items()}
+
+
+@pytest.mark.parametrize(
+    "seen", [{}, {"slit": True}, {"noise": 0.1}, {"slit": True, "noise": 0.1, "speck": True}, {"deep": 4.0}]
+)
+@pytest.mark.parametrize("guess", [(8.0, 0.0), (-6.0, 3.0), (0.0, -4.0)])
+def test_corners_are_where_the_line_ends(seen, guess):
+    found = lip_line(_face(**seen), _guess(*guess), FORWARD)
+    for name, side in (("ch_l", 1), ("ch_r", -1)):
+        assert found.corners[name] == pytest.approx([side * HALF, HALF**2 / 40, RISE], abs=2.0)
+    assert found.middle[[0, 2]] == pytest.approx([0, 0], abs=1.0)
+
+
+def test_corners_are_the_same_on_a_turned_small_scan():
+    face, scale = _face(), 0.8
+    turn = np.linalg.qr(np.random.default_rng(2).standard_normal((3, 3)))[0]
+    turn *= np.sign(np.linalg.det(turn))
+    small = Surface(scale * face.vertices @ turn.T, face.triangles)
+    guess = {name: scale * turn @ place for name, place in _guess(4.0).items()}
+    straight, found = lip_line(face, _guess(4.0), FORWARD), lip_line(small, guess, turn @ FORWARD, scale)
+    for name, place in straight.marks.items():
+        assert found.marks[name] == pytest.approx(scale * turn @ place, abs=0.6)
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.15])
+def test_smooth_skin_has_no_line(noise):
+    assert lip_line(_face(deep=0.0, noise=noise), _guess(), FORWARD) is None
+
+
+def test_neither_a_weak_place_nor_a_speck_beyond_ends_a_line():
+    worth = np.zeros(101)
+    worth[20:81] = PLAIN + 0.4
+    worth[60:66] = PLAIN - 0.5
+    worth[90:92] = PLAIN + 0.4
+    assert line_ends(worth) == (80, 20)
+
+
+@pytest.mark.parametrize("name", ["lps_infinite", "rvcg_dummyhead"])
+def test_corners_of_scanned_mouths(shared, reference, name):
+    scan = shared / "scans" / f"{name}.ply"
+    if not scan.is_file():
+        pytest.skip(f"no {scan.name} in {scan.parent}")
+    truth = json.loads(scan.with_name(f"{name}.landmarks.json").read_text(encoding="utf-8"))["landmarks"]
+    found = finish(find_landmarks(clean_scan(read_ply(scan))[0], reference)).positions
+    assert max(np.linalg.norm(found[mark] - truth[mark]) for mark in ("ch_l", "ch_r", "sto")) < 2.0
