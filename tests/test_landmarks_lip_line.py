@@ -17,9 +17,9 @@ HALF, RISE = 22.0, 3.0  # mm: half the mouth's width, how far its corners are ra
 FORWARD = np.array([0.0, -1.0, 0.0])
 
 
-def _face(deep=2.0, slit=False, noise=0.0, speck=False):
+def _face(deep=2.0, slit=False, noise=0.0, speck=False, hole=False):
     """A rounded surface with a crease in it like that between closed lips, ``deep`` mm, or a ``slit`` without data; with
-    ``noise`` mm, and a ``speck`` without data 12 mm beyond the left corner."""
+    ``noise`` mm, a ``speck`` without data 12 mm beyond the left corner, and a ``hole`` about the right one."""
     x, z = np.meshgrid(np.arange(-60, 60.1, 0.5), np.arange(-40, 40.1, 0.5))
     high = z - RISE * (x / HALF) ** 2
     along = np.clip((HALF - np.abs(x)) / 3, 0, 1)
@@ -35,6 +35,7 @@ def _face(deep=2.0, slit=False, noise=0.0, speck=False):
     across, _, up = points[triangles].mean(axis=1).T
     gone = slit & (np.abs(up - RISE * (across / HALF) ** 2) < 0.8) & (np.abs(across) < HALF)
     gone |= speck & (np.hypot(across - HALF - 12, up - RISE * ((HALF + 12) / HALF) ** 2) < 1.5)
+    gone |= hole & (np.hypot(across + HALF, up - RISE) < 12)
     return Surface(points, triangles[~gone])
 
 
@@ -65,6 +66,12 @@ def test_corners_are_the_same_on_a_turned_small_scan():
     straight, found = lip_line(face, _guess(4.0), FORWARD), lip_line(small, guess, turn @ FORWARD, scale)
     for name, place in straight.marks.items():
         assert found.marks[name] == pytest.approx(scale * turn @ place, abs=0.6)
+
+
+def test_a_corner_in_a_hole_is_not_told():
+    found = lip_line(_face(slit=True, hole=True), _guess(4.0), FORWARD)
+    assert set(found.corners) == {"ch_l"}
+    assert found.corners["ch_l"] == pytest.approx([HALF, HALF**2 / 40, RISE], abs=2.0)
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.15])

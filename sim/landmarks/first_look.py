@@ -24,7 +24,7 @@ from .shape_fit import NoFaceError, fit_shape
 from .shape_space import shape_space
 
 LOOKING = "Looking at lids and lips"
-SKULL = ("v", "op", "eu_l", "eu_r")
+SKULL = ("v", "op")
 FEWEST = 4  # landmarks that tell where the head is
 
 

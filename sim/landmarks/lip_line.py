@@ -25,12 +25,13 @@ ALONG = 9  # columns over which it is averaged
 #: from .5, where wrinkles go on with it, to 1, where thin lips end too soon.
 PLAIN = 0.75
 MIDDLE = 10.0  # mm to either side of the middle where it must be as deep
-AROUND = 4  # columns beside a corner that tell how deep it lies
+AROUND = 4  # columns beside a corner that tell how deep it lies, and must not lie in a hole
+SLIT = 4.0  # mm from above to below of what a scanner loses between lips; what is wider is a hole, and tells nothing
 
 
 @dataclass(frozen=True, eq=False)
 class LipLine:
-    """corners : ``ch_l`` and ``ch_r`` -> (3,) mm, where the line ends; middle (3,) mm : of the line."""
+    """corners : ``ch_l`` and ``ch_r`` -> (3,) mm, where the line ends, those that are seen; middle (3,) mm : of the line."""
 
     corners: dict[str, np.ndarray]
     middle: np.ndarray
@@ -52,19 +53,30 @@ def lip_line(target: Surface, marks, forward, scale: float = 1.0) -> LipLine | N
     arch, up = mouth_arch(marks, "sto", forward, scale * aside)
     places = arch[:, None] + scale * heights[:, None] * up
     depth = depths(target, places.reshape(-1, 3), forward).reshape(places.shape[:2]) / scale
-    worth = uniform_filter1d(crease(depth, int(BESIDE / STEP)), ALONG, axis=0)
-    way = best_way(worth - STRAY * (heights / FAR) ** 2)
+    hole = missing_run(depth) > SLIT / STEP
+    worth = np.where(hole, 0.0, crease(depth, int(BESIDE / STEP)))
+    way = best_way(uniform_filter1d(worth, ALONG, axis=0) - STRAY * (heights / FAR) ** 2)
     columns = np.arange(len(aside))
-    worth, depth, places = worth[columns, way], depth[columns, way], places[columns, way]
+    worth = uniform_filter1d(worth[columns, way], ALONG)
+    depth, places, hole = depth[columns, way], places[columns, way], hole[columns, way]
     if worth[np.abs(aside) < MIDDLE].mean() < PLAIN:
         return None
-    ends = line_ends(worth)
-    behind = [_typical(depth[max(k - AROUND, 0) : k + AROUND + 1]) for k in (*ends, len(aside) // 2)]
-    seen = places[[*ends, len(aside) // 2]] - scale * np.array(behind)[:, None] * forward
-    found = target.closest(seen[:2], NEAR * scale)
-    if not found.found.all() or np.linalg.norm(np.subtract(*found.points)) < NARROW * scale:
+    corners, middle = {}, len(aside) // 2
+    for name, end in zip(CORNERS, line_ends(worth), strict=True):
+        found = target.closest((places[end] - scale * _behind(depth, end) * forward)[None], NEAR * scale)
+        if found.found[0] and not hole[max(end - AROUND, 0) : end + AROUND + 1].any():
+            corners[name] = found.points[0]
+    if not corners or np.ptp(line_ends(worth)) * ASIDE < NARROW:
         return None
-    return LipLine(dict(zip(CORNERS, found.points, strict=True)), seen[2])
+    return LipLine(corners, places[middle] - scale * _behind(depth, middle) * forward)
+
+
+def missing_run(depth) -> np.ndarray:
+    """(c, r) how many places in a row are missing around each of the columns ``depth`` (c, r); 0 where it is known."""
+    known, row = np.isfinite(depth), np.arange(depth.shape[1])
+    before = np.maximum.accumulate(np.where(known, row, -1), axis=1)
+    after = np.minimum.accumulate(np.where(known, row, len(row))[:, ::-1], axis=1)[:, ::-1]
+    return np.where(known, 0, after - before - 1)
 
 
 def line_ends(worth) -> tuple[int, int]:
@@ -78,7 +90,8 @@ def line_ends(worth) -> tuple[int, int]:
     return int(left), int(right)
 
 
-def _typical(depth) -> float:
-    """The median of a ``depth`` (k,) where it is known; 0 where it is nowhere."""
-    known = depth[np.isfinite(depth)]
+def _behind(depth, column: int) -> float:
+    """The median of what is known of a ``depth`` (k,) around a ``column``; 0 where nothing is."""
+    around = depth[max(column - AROUND, 0) : column + AROUND + 1]
+    known = around[np.isfinite(around)]
     return float(np.median(known)) if len(known) else 0.0
