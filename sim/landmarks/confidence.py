@@ -8,6 +8,7 @@ from ..adapt.closest import Surface
 from ..adapt.completion import sigma
 from ..adapt.ears import EAR_MARKS, SOME_MARKS
 from ..adapt.scan_surface import cuts_of
+from ..mesh import vertex_normals
 from ..scan.flat_cuts import beyond
 from .shape_fit import Expression, ShapeFit
 from .shape_space import ShapeSpace
@@ -17,10 +18,10 @@ AROUND = 9.0  # mm: skin about a landmark that must have data
 MID_AIR = 3.0  # mm: a landmark farther from the scan hangs in mid-air
 LOST = 11.0  # mm: a landmark less certain than that is missing
 UNSURE = 8.0  # mm of doubt that halve the confidence
+NEAR_EAR = 8.0  # mm from an ear to what the scan has there
 LIES = 2.5  # mm from the scan within which skin lies on it
-#: Sure landmarks of an ear that tell that the scan shows it, and not hair; fewer do where, of the skin of the ear that finds
-#: the scan, so large a share lies on it: .53 and .57 of ears under hair, from .74 of 30 others.
-MOST_MARKS, LIKE_AN_EAR = 5, 0.66
+#: Likeness of a scan to an ear from which on it shows one, see `like_ears`: .47 of ears under hair, from .69 of 22 others.
+LIKE_AN_EAR = 0.58
 SLIT = 0.5  # opening of lids against the reference's below which open eyes were not read well
 UNSEEN = ("tr",)  # no shape tells where hair begins
 
@@ -63,15 +64,15 @@ def judge(space: ShapeSpace, fit: ShapeFit, target: Surface, positions):
 
 def judge_together(positions, confidence, mid_air, rest, shown: Expression, like_ears) -> dict[str, float]:
     """Confidence with those lowered that only look sure one by one: on ears under hair, of which few landmarks can be
-    placed, on lids that nearly meet although the eye is not ``shown`` shut, and on lids that had to be held open.
+    seen, on lids that nearly meet although the eye is not ``shown`` shut, and on lids that had to be held open.
 
     rest : the reference's own landmarks, name -> mm; like_ears : see the function `like_ears`
     """
     out = dict(confidence)
     for side in ("l", "r"):
         ear = [f"{n}_{side}" for n in EAR_MARKS if f"{n}_{side}" in out]
-        enough = SOME_MARKS if like_ears[side] > LIKE_AN_EAR else MOST_MARKS
-        weak = sum(out[n] >= SURE and n not in mid_air for n in ear) < enough
+        marks = sum(out[n] >= SURE and n not in mid_air for n in ear)
+        weak = marks < SOME_MARKS or like_ears[side] < LIKE_AN_EAR
         lids = [f"{n}_{side}" for n in ("ps", "pi", "en", "ex")]
         slit = side not in shown.shut and all(n in positions for n in lids)
         slit = slit and (shown.wide or _opening(positions, lids) < SLIT * _opening(rest, lids))
@@ -81,13 +82,24 @@ def judge_together(positions, confidence, mid_air, rest, shown: Expression, like
     return out
 
 
-def like_ears(space: ShapeSpace, fit: ShapeFit) -> dict[str, float]:
-    """Side -> 0..1, share that lies on the scan of the ear's skin that finds something there: hair lies about an ear."""
+def like_ears(space: ShapeSpace, fit: ShapeFit, target: Surface) -> dict[str, float]:
+    """Side -> 0..1, how like an ear the scan is where that ear is laid.
+
+    It is the share that lies on the scan of the ear's skin that finds something there, for hair lies about an ear, times how
+    far the scan's normals vary there against the ear's own, for hair is smoother than its folds.
+    """
     on = fit.trust * (np.abs(np.nan_to_num(fit.distance, nan=9.0)) < LIES)
+    normals = vertex_normals(fit.points, space.triangles)
     out = {}
     for side, sign in (("l", 1), ("r", -1)):
-        ear = (space.ear > 0.5) & (sign * space.points[:, 0] > 0) & (fit.trust > 0)
-        out[side] = float((on * space.area)[ear].sum() / max(space.area[ear].sum(), 1e-9))
+        ear = np.flatnonzero((space.ear > 0.5) & (sign * space.points[:, 0] > 0) & (fit.trust > 0))
+        found = target.closest(fit.points[ear], NEAR_EAR * fit.pose.scale)
+        ear, seen = ear[found.found], found.normals[found.found]
+        if len(ear) == 0:
+            out[side] = 0.0
+            continue
+        varied = np.sqrt(seen.var(axis=0).sum() / max(normals[ear].var(axis=0).sum(), 1e-9))
+        out[side] = float(np.average(on[ear], weights=space.area[ear]) * min(varied, 1.0))
     return out
 
 

@@ -88,5 +88,5 @@ def find_landmarks(mesh: Mesh, reference: Head | None = None, unit_scales=(1.0,)
         positions |= {n: p for n, p in mouth.marks.items() if n in positions}
         mid_air += ("sto",) if shown.parted and "sto" in positions and "sto" not in mid_air else ()
     rest = reference.landmark_positions()
-    confidence = judge_together(positions, confidence, mid_air, rest, shown, like_ears(space, fit))
+    confidence = judge_together(positions, confidence, mid_air, rest, shown, like_ears(space, fit, target))
     return FoundLandmarks(positions, confidence, mid_air, missing, scale, misfit)

@@ -54,11 +54,10 @@ def lip_line(target: Surface, marks, forward, scale: float = 1.0) -> LipLine | N
     places = arch[:, None] + scale * heights[:, None] * up
     depth = depths(target, places.reshape(-1, 3), forward).reshape(places.shape[:2]) / scale
     hole = missing_run(depth) > SLIT / STEP
-    worth = np.where(hole, 0.0, crease(depth, int(BESIDE / STEP)))
-    way = best_way(uniform_filter1d(worth, ALONG, axis=0) - STRAY * (heights / FAR) ** 2)
+    worth = uniform_filter1d(np.where(hole, 0.0, crease(depth, int(BESIDE / STEP))), ALONG, axis=0)
+    way = best_way(worth - STRAY * (heights / FAR) ** 2)
     columns = np.arange(len(aside))
-    worth = uniform_filter1d(worth[columns, way], ALONG)
-    depth, places, hole = depth[columns, way], places[columns, way], hole[columns, way]
+    worth, depth, places, hole = (grid[columns, way] for grid in (worth, depth, places, hole))
     if worth[np.abs(aside) < MIDDLE].mean() < PLAIN:
         return None
     corners, middle = {}, len(aside) // 2
