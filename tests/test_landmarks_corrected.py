@@ -107,7 +107,7 @@ def test_a_landmark_corrected_in_a_file_is_as_good_as_one_that_was_placed(found,
         assert "ch_l" in read_landmark_file(path).positions
 
 
-def test_ears_of_which_few_landmarks_are_sure_count_if_the_scan_lies_like_ears(reference):
+def test_ears_count_where_some_landmarks_are_sure_and_the_scan_is_like_an_ear(reference):
     from headshop.sim.adapt.ears import EAR_MARKS
     from headshop.sim.landmarks.confidence import LIKE_AN_EAR, judge_together
     from headshop.sim.landmarks.shape_fit import REST
@@ -124,4 +124,4 @@ def test_ears_of_which_few_landmarks_are_sure_count_if_the_scan_lies_like_ears(r
 
     assert sure(2) == {"l": 0, "r": 0}
     assert sure(3) == {"l": 3, "r": 0}
-    assert sure(5) == {"l": 5, "r": 5}
+    assert sure(6) == {"l": 6, "r": 0}

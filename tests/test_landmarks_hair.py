@@ -6,9 +6,13 @@ import pytest
 from scipy.spatial import cKDTree
 
 from headshop.sim.adapt.build import build_head
+from headshop.sim.adapt.closest import Surface
 from headshop.sim.adapt.ears import EAR_MARKS
 from headshop.sim.anatomy.landmark_names import SKIN
+from headshop.sim.landmarks.confidence import LIKE_AN_EAR, like_ears
 from headshop.sim.landmarks.find import find_landmarks
+from headshop.sim.landmarks.pose_search import Pose
+from headshop.sim.landmarks.shape_fit import ShapeFit
 from headshop.sim.landmarks.shape_space import shape_space
 from headshop.sim.mesh import Mesh, vertex_normals
 from headshop.sim.mesh_subdivision import drawn
@@ -61,6 +65,21 @@ def test_a_head_with_thick_hair_has_a_whole_crown(hairy, reference):
     skin = head.skin
     top = drawn(skin.faces, skin.vertices)[:, 2].max()
     assert truth["v"][2] - 8 < top < truth["v"][2] + THICK + 3
+
+
+def test_hair_over_ears_is_smoother_than_ears(reference):
+    """The landmarks of what lies as near as an ear, but has none of its folds, are not those of an ear."""
+    space = shape_space(reference)
+    covered = space.points.copy()
+    ears = np.flatnonzero(space.ear > 0.2)
+    near = cKDTree(space.points).query(space.points[ears], 60)[1]
+    for _ in range(20):
+        covered[ears] = covered[near].mean(axis=1)
+    none = np.zeros(len(space.points))
+    fit = ShapeFit(space.points, none[:1], Pose(1.0, np.eye(3), none[:3], 0.0), none + 1, none, np.zeros((1, 1)))
+    for points, seen in ((space.points, True), (covered, False)):
+        like = like_ears(space, fit, Surface(points, space.triangles))
+        assert [like[side] > LIKE_AN_EAR for side in "lr"] == [seen, seen]
 
 
 def test_hair_grows_on_scalp_and_nape_only(reference):
