@@ -7,8 +7,13 @@ import numpy as np
 import pytest
 
 from headshop.sim.adapt.closest import Surface
+from headshop.sim.landmarks.expression import told_of_lips
 from headshop.sim.landmarks.find import find_landmarks
-from headshop.sim.landmarks.lip_line import PLAIN, line_ends, lip_line
+from headshop.sim.landmarks.lip_line import PLAIN, LipLine, line_ends, lip_line
+from headshop.sim.landmarks.picked import moved
+from headshop.sim.landmarks.pose_search import Pose
+from headshop.sim.landmarks.shape_fit import CHANGE, fit_shape
+from headshop.sim.landmarks.shape_space import shape_space
 from headshop.sim.progress import finish
 from headshop.sim.scan.clean import clean_scan
 from headshop.sim.scan.ply import read_ply
@@ -85,6 +90,29 @@ def test_neither_a_weak_place_nor_a_speck_beyond_ends_a_line():
     worth[60:66] = PLAIN - 0.5
     worth[90:92] = PLAIN + 0.4
     assert line_ends(worth) == (80, 20)
+
+
+def test_the_skin_follows_the_line(reference):
+    """Of a mouth narrower than the face lets expect, the fit itself has its corners where the line has them."""
+    space = shape_space(reference)
+    rest = space.landmarks(space.points)
+    line = LipLine({n: rest[n] * [0.75, 1, 1] + moved(n) for n in ("ch_l", "ch_r")}, rest["sto"] + moved("sto"))
+    target = Surface(space.points, space.triangles)
+    pose = Pose(1.0, np.eye(3), np.zeros(3), 0.0)
+    start = _run(fit_shape(space, target, pose, CHANGE))
+    fit = _run(fit_shape(space, target, pose, CHANGE, told=told_of_lips(space, start, line)))
+    for name in ("ch_l", "ch_r"):
+        goal = line.corners[name] - moved(name)
+        before, after = (np.linalg.norm(space.landmarks(f.points)[name] - goal) for f in (start, fit))
+        assert after < 0.7 * before  # the scan here says otherwise
+
+
+def _run(work):
+    while True:
+        try:
+            next(work)
+        except StopIteration as end:
+            return end.value
 
 
 @pytest.mark.parametrize("name", ["lps_infinite", "rvcg_dummyhead"])

@@ -54,6 +54,7 @@ def test_corners_are_where_the_gap_ends(teeth):
         assert found.corners[name] == pytest.approx([side * HALF, HALF**2 / 40, RISE], abs=2.5)
     assert found.upper == pytest.approx([0, 0, OPEN / 2], abs=1.0)
     assert found.lower == pytest.approx([0, 0, -OPEN / 2], abs=1.0)
+    assert found.marks["sto"] == pytest.approx([0, 0, 0], abs=1.0)
 
 
 def test_corners_are_the_same_on_a_turned_small_scan():
@@ -107,5 +108,6 @@ def test_corners_of_smiling_subjects(shared, reference, name):
     if not scan.is_file():
         pytest.skip(f"no {scan.name} in {scan.parent}")
     truth = json.loads(scan.with_name(f"{name}_smile_truth.json").read_text(encoding="utf-8"))["landmarks"]
-    found = finish(find_landmarks(clean_scan(read_ply(scan))[0], reference)).positions
-    assert max(np.linalg.norm(found[corner] - truth[corner]) for corner in ("ch_l", "ch_r")) < 3.0
+    found = finish(find_landmarks(clean_scan(read_ply(scan))[0], reference))
+    assert max(np.linalg.norm(found.positions[mark] - truth[mark]) for mark in ("ch_l", "ch_r", "sto")) < 3.0
+    assert "sto" in found.mid_air and "sto" not in found.sure()

@@ -21,8 +21,8 @@ WIDE, FAR = 44.0, 9.0  # mm to either side of the middle, and above and below wh
 BESIDE = 2.0  # mm above and below from which the crease is seen to be deeper
 STRAY = 0.3  # mm of depth that it must have more where it is `FAR` off
 ALONG = 9  # columns over which it is averaged
-#: mm deep that the crease is between lips, and less beyond their corners: the middle of 26 mouths of which both are known,
-#: from .5, where wrinkles go on with it, to 1, where thin lips end too soon.
+#: mm deep that the crease is between lips, and less beyond their corners. Of 38 closed mouths corners were 1.5 mm off on
+#: average, 5 at most; with .5 wrinkles went on with it (2.5 mm, 15 at most), with .8 a weak line ended 23 mm too soon.
 PLAIN = 0.75
 MIDDLE = 10.0  # mm to either side of the middle where it must be as deep
 AROUND = 4  # columns beside a corner that tell how deep it lies, and must not lie in a hole
