@@ -54,7 +54,11 @@ RELAX = (
 
 #: What of a scan is left out when a head is built.
 LEAVE_OUT = (
-    ("AUTO", "What Is No Skin", "Leave out flat ends of the scan and what the lips hold, such as a breathing tube"),
+    (
+        "AUTO",
+        "What Is No Skin",
+        "Leave out flat ends of the scan, hair, and what the lips hold, such as a breathing tube",
+    ),
     ("NEVER", "Nothing", "Take all of the scan for skin"),
 )
 

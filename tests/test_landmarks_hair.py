@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Thick hair: it stands off the head by centimetres, and takes neither ears nor the crown with it."""
+"""Hair: thick or rough, it takes neither ears nor the crown with it, and the scalp below it is invented."""
 
 import numpy as np
 import pytest
+from scipy.sparse import csr_matrix, identity, vstack
 from scipy.spatial import cKDTree
 
 from headshop.sim.adapt.build import build_head
@@ -11,9 +12,11 @@ from headshop.sim.adapt.ears import EAR_MARKS
 from headshop.sim.anatomy.landmark_names import SKIN
 from headshop.sim.landmarks.confidence import LIKE_AN_EAR, like_ears
 from headshop.sim.landmarks.find import find_landmarks
+from headshop.sim.landmarks.first_look import first_look
 from headshop.sim.landmarks.pose_search import Pose
 from headshop.sim.landmarks.shape_fit import ShapeFit
 from headshop.sim.landmarks.shape_space import shape_space
+from headshop.sim.landmarks.under_hair import beside_hidden_ears, hair_over, in_face, under_hair
 from headshop.sim.mesh import Mesh, vertex_normals
 from headshop.sim.mesh_subdivision import drawn
 from headshop.sim.progress import finish
@@ -23,27 +26,75 @@ THICK = 20.0  # mm
 RISE = 12.0  # mm from where hair begins to where it is as thick
 HIGH = 0.2  # of its height above the brows by which the skull is higher than most
 SPARE = 30.0  # mm from the tragus that hair leaves free
+SHORT, TUFT, STRANDS = 6.0, 1.2, (9.0, 4.0)  # mm: short hair, how far it varies, and from where to where it does
+
+
+def grown(reference, thick):
+    """Somebody with a high skull and hair ``thick`` mm, on scalp and nape: the scan, the skin below, and its landmarks (mm)."""
+    field = draw_field(reference.landmark_positions(), np.random.default_rng(5))
+    skin = reference.skin
+    rest = reference.landmark_positions()
+    at = skin.vertices
+    whole = drawn(skin.faces, at + field(at))
+    above = np.maximum(at[:, 2] - rest["g"][2], 0)
+    whole[:, 2] += HIGH * above**2 / above.max()
+    grows = reference.groups["scalp"] > 0.5
+    grows |= (at[:, 1] > rest["pa_l"][1] + 15) & (at[:, 2] > rest["gn"][2] + 25)
+    free = cKDTree(at[~grows]).query(at)[0]
+    free = np.minimum(free, cKDTree([rest["t_l"], rest["t_r"]]).query(at)[0] - SPARE)
+    rise = np.clip(free / RISE, 0, 1) * grows
+    outer = skin.triangles[~(reference.groups["inner"] > 0.5)[skin.triangles].any(axis=1)]
+    fine, parts_of = subdivided(outer, len(whole))
+    points, normals = parts_of @ whole, parts_of @ vertex_normals(whole, outer)
+    points = points + (thick(points) * (parts_of @ rise))[:, None] * normals
+    parts = {name: part.vertices for name, part in reference.parts.items() if name != "skin"}
+    truth = reference.landmarks.on({"skin": whole} | parts)
+    return Mesh.from_triangles(points, fine), whole, truth
+
+
+def subdivided(triangles, n):
+    """Each of ``triangles`` (t, 3) in four, twice, and the new vertices as sparse rows over the ``n`` old ones."""
+    rows = identity(n, format="csr")
+    for _ in range(2):
+        ends = np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)
+        side, which = np.unique(ends, axis=0, return_inverse=True)
+        k = np.arange(len(side))
+        middle = csr_matrix(
+            (np.full(2 * len(side), 0.5), (np.r_[k, k], side.T.ravel())), shape=(len(side), rows.shape[0])
+        )
+        ab, bc, ca = which.reshape(3, -1) + rows.shape[0]
+        a, b, c = triangles.T
+        rows = vstack([rows, middle @ rows]).tocsr()
+        triangles = np.concatenate([np.stack(t, axis=1) for t in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))])
+    return triangles, rows
 
 
 @pytest.fixture(scope="module")
 def hairy(reference):
-    """Somebody with a high skull and thick hair on scalp and nape: the scan, the skin below, and its landmarks (mm)."""
-    field = draw_field(reference.landmark_positions(), np.random.default_rng(5))
-    skin = reference.skin
-    whole = drawn(skin.faces, skin.vertices + field(skin.vertices))
-    rest = reference.landmark_positions()
-    above = np.maximum(skin.vertices[:, 2] - rest["g"][2], 0)
-    whole[:, 2] += HIGH * above**2 / above.max()
-    grows = reference.groups["scalp"] > 0.5
-    grows |= (skin.vertices[:, 1] > rest["pa_l"][1] + 15) & (skin.vertices[:, 2] > rest["gn"][2] + 25)
-    free = cKDTree(skin.vertices[~grows]).query(skin.vertices)[0]
-    free = np.minimum(free, cKDTree([rest["t_l"], rest["t_r"]]).query(skin.vertices)[0] - SPARE)
-    rise = THICK * np.clip(free / RISE, 0, 1) * grows
-    outer = skin.triangles[~(reference.groups["inner"] > 0.5)[skin.triangles].any(axis=1)]
-    points = whole + rise[:, None] * vertex_normals(whole, outer)
-    parts = {name: part.vertices for name, part in reference.parts.items() if name != "skin"}
-    truth = reference.landmarks.on({"skin": whole} | parts)
-    return Mesh.from_triangles(points, outer), whole, truth
+    """With thick hair, all of it combed."""
+    return grown(reference, lambda points: THICK)
+
+
+@pytest.fixture(scope="module")
+def shaggy(reference):
+    """With short hair, in tufts."""
+    return grown(reference, shag)
+
+
+def shag(points):
+    """(n,) mm, the height of short hair in tufts over ``points`` (n, 3) mm."""
+    rng = np.random.default_rng(3)
+    out = np.full(len(points), SHORT)
+    for size in STRANDS:
+        waves, phase = rng.normal(size=(3, 200)) / size, rng.uniform(0, 2 * np.pi, 200)
+        out += TUFT * np.sqrt(2 / 200) * np.cos(points @ waves + phase).sum(axis=1)
+    return np.maximum(out, 0)
+
+
+def of_face(truth):
+    """Of all landmarks, those that no hair hides."""
+    hidden = ("eu", "ft", "v", "op", "tr")
+    return {n: p for n, p in truth.items() if n in SKIN and n.partition("_")[0] not in hidden}
 
 
 def test_ears_are_found_below_thick_hair(hairy, reference):
@@ -60,8 +111,7 @@ def test_ears_are_found_below_thick_hair(hairy, reference):
 def test_a_head_with_thick_hair_has_a_whole_crown(hairy, reference):
     """Without landmarks of the skull, which hair hides, the crown is neither cut off nor dented."""
     scan, _, truth = hairy
-    given = {n: truth[n] for n in SKIN if n.rpartition("_")[0] not in ("eu", "ft") and n not in ("v", "op", "tr")}
-    head = finish(build_head(reference, scan, given, detail=0)).head
+    head = finish(build_head(reference, scan, of_face(truth), detail=0)).head
     skin = head.skin
     top = drawn(skin.faces, skin.vertices)[:, 2].max()
     assert truth["v"][2] - 8 < top < truth["v"][2] + THICK + 3
@@ -90,3 +140,96 @@ def test_hair_grows_on_scalp_and_nape_only(reference):
     assert {"v", "op"} <= grows
     bare = {n for n in marks if n.rpartition("_")[0] in EAR_MARKS} | {"g", "n", "prn", "sto", "gn", "zy_l", "zy_r"}
     assert not grows & bare
+
+
+def surface_of(mesh):
+    return Surface(mesh.vertices, mesh.triangles, smooth=2.0)
+
+
+@pytest.mark.parametrize("kind", ["hairy", "shaggy"])
+def test_hair_is_left_out_and_the_face_is_not(kind, reference, request):
+    scan, whole, truth = request.getfixturevalue(kind)
+    scan = surface_of(scan)
+    look = finish(first_look(reference, scan, of_face(truth)))
+    assert look.left_out["hair"] == pytest.approx(scan.area.sum() - look.target.area.sum())
+    off = Surface(whole, reference.skin.triangles).closest(scan.vertices, 60.0).distance
+    kept = np.zeros(len(off), dtype=bool)
+    kept[np.unique(cKDTree(scan.vertices).query(look.target.vertices)[1])] = True
+    assert kept[off < 0.1].mean() > 0.97  # skin
+    assert kept[off > 0.8 * SHORT].mean() < 0.3  # hair
+
+
+def test_a_bald_head_is_kept_whole(reference):
+    scan, _, truth = grown(reference, lambda points: 0.0)
+    scan = surface_of(scan)
+    look = finish(first_look(reference, scan, of_face(truth)))
+    assert look.target is scan and look.filled is scan and look.left_out["hair"] == 0
+
+
+def test_who_wants_to_keep_hair_does(reference, shaggy):
+    scan = surface_of(shaggy[0])
+    look = finish(first_look(reference, scan, of_face(shaggy[2]), keep_held=True))
+    assert look.target is scan and look.filled is scan and look.left_out["hair"] == 0
+
+
+def test_the_scalp_under_hair_is_invented_where_it_probably_is(reference, shaggy):
+    scan, whole, truth = shaggy
+    built = finish(build_head(reference, scan, of_face(truth), detail=0))
+    skin = built.head.skin
+    scalp = reference.groups["scalp"] > 0.9
+    below = Surface(whole, reference.skin.triangles)
+    places = drawn(skin.faces, skin.vertices)
+    off = below.closest(places[scalp], 60.0).distance
+    assert off.mean() < 0.7 * SHORT and np.percentile(off, 95) < 12.0
+    # It is smooth, as scalps are and hair is not.
+    normals = vertex_normals(places, skin.triangles)[scalp]
+    near = cKDTree(places[scalp]).query(places[scalp], 5)[1]
+    rough = np.degrees(np.arccos(np.clip((normals[near[:, 1:]] * normals[:, None]).sum(axis=2), -1, 1))).mean()
+    real = vertex_normals(whole, skin.triangles)[scalp]
+    assert rough < 1.3 * np.degrees(np.arccos(np.clip((real[near[:, 1:]] * real[:, None]).sum(axis=2), -1, 1))).mean()
+    assert built.attributes["fitted"][scalp].mean() < 0.2
+    assert "left out: hair;" in built.fit["sentence"] and "scalp" in built.fit["sentence"]
+    face = (reference.groups["face"] > 0.5) & (reference.groups["inner"] < 0.5)
+    assert below.closest(places[face]).distance.mean() < 0.3
+
+
+def laid(space, points):
+    """The `ShapeFit` of a skin that lies where it ought to, at ``points`` (n, 3) mm."""
+    none = np.zeros(len(points))
+    return ShapeFit(points, none[:1], Pose(1.0, np.eye(3), none[:3], 0.0), none + 1, none, np.zeros((1, 1)))
+
+
+def test_hair_hides_what_lies_about_ears_that_it_hides(reference):
+    space = shape_space(reference)
+    fit = laid(space, space.points)
+    bare = Surface(space.points, space.triangles)
+    assert not beside_hidden_ears(space, fit, bare, ()).any()
+    left = (space.points[:, 0] > 0) & (cKDTree(space.points[space.ear > 0.3]).query(space.points)[0] < 25)
+    hidden = bare.without(left[space.triangles].any(axis=1))  # nothing of the left ear can be seen
+    about = beside_hidden_ears(space, fit, hidden, ())
+    assert about[left].all() and not about[space.points[:, 0] < -50].any()
+    assert not beside_hidden_ears(space, fit, hidden, ("sa_l",)).any()  # somebody says where it is
+
+
+def test_the_face_is_no_hair(reference):
+    space = shape_space(reference)
+    marks = space.landmarks(space.points)
+    inside = in_face(space, laid(space, space.points), {}, 3.0)
+    near = {n: inside[cKDTree(space.points).query(place)[1]] for n, place in marks.items()}
+    assert all(near[n] for n in ("g", "prn", "sto", "pg", "or_l", "or_r", "ft_l"))
+    assert not any(near[n] for n in ("v", "op", "eu_l", "t_l", "pa_r"))
+    given = {"tr": marks["tr"] - [0, 0, 40]}  # hair begins at the brows
+    lost = inside & ~in_face(space, laid(space, space.points), given, 3.0)
+    assert lost.any() and space.points[lost, 2].mean() > marks["g"][2]
+
+
+def test_a_noisy_scan_of_a_bald_head_shows_no_hair(reference):
+    """Roughness counts only against that of the same scan's forehead."""
+    space = shape_space(reference)
+    scan, whole, _ = grown(reference, lambda points: 0.0)
+    fit = laid(space, whole[space.vertices])
+    rng = np.random.default_rng(0)
+    for noise in (0.0, 0.3, 0.6):
+        points = scan.vertices + rng.normal(scale=noise, size=scan.vertices.shape)
+        covered = under_hair(space, fit, Surface(points, scan.triangles))
+        assert not covered.any() and not hair_over(space, fit, surface_of(scan), covered).any()

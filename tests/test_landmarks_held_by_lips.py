@@ -79,7 +79,7 @@ def test_a_tube_is_left_out_and_the_face_is_not(reference, marks, scan, tube):
     skin = ~in_tube(scan.corners.mean(axis=1), tube)
     lost = scan.area[skin].sum() - look.target.area[~kept].sum()
     assert lost < 150.0  # mm² of skin just beside it
-    assert look.held_mm2 == pytest.approx(scan.area.sum() - look.target.area.sum())
+    assert look.left_out["held_by_lips"] == pytest.approx(scan.area.sum() - look.target.area.sum())
 
 
 def test_skin_behind_it_is_where_the_other_side_says(reference, marks, scan, face):
@@ -94,12 +94,12 @@ def test_skin_behind_it_is_where_the_other_side_says(reference, marks, scan, fac
 def test_a_face_with_nothing_in_its_mouth_is_kept_whole(reference, marks, face):
     whole = Surface(*face, smooth=2.0)
     look = finish(first_look(reference, whole, marks))
-    assert look.target is whole and look.filled is whole and look.held_mm2 == 0
+    assert look.target is whole and look.filled is whole and look.left_out["held_by_lips"] == 0
 
 
 def test_who_wants_to_keep_it_does(reference, marks, scan):
     look = finish(first_look(reference, scan, marks, keep_held=True))
-    assert look.target is scan and look.filled is scan and look.held_mm2 == 0
+    assert look.target is scan and look.filled is scan and look.left_out["held_by_lips"] == 0
 
 
 def test_the_head_has_no_tube_and_says_so(reference, marks, scan, face, tube):

@@ -72,7 +72,7 @@ def build_head(
     detail : texels along a side of the detail maps; 0 for none
     relax : ``auto`` makes a face neutral whose lips are parted (`sim.relax`), ``always`` any, ``never`` none. The figures
         in ``fit`` are those of the face as scanned.
-    leave_out : ``auto`` leaves out of the scan what is no skin, flat ends and what the lips hold, ``never`` nothing
+    leave_out : ``auto`` leaves out of the scan what is no skin, flat ends, what the lips hold and hair, ``never`` nothing
     found : names of the landmarks that nobody picked: the skin is held to them more loosely
 
     Raises
@@ -109,7 +109,7 @@ def build_head(
     scanned = head.skin.vertices + (fit.cage - skin)
     report = fit_report(reference, fit, given, scanned)
     report["invented"] = invented(fitted_shares(head, fit.fitted.fitted))
-    report["left_out_mm2"] = {"flat_ends": float(whole.area.sum() - target.area.sum()), "held_by_lips": look.held_mm2}
+    report["left_out_mm2"] = {"flat_ends": float(whole.area.sum() - target.area.sum())} | look.left_out
     report["sentence"] = fit_sentence(report, report["invented"])
     if neutral is not None and relax == "never":
         head, neutral = kept_open(fit.lips_closed, head, scanned, neutral.jaw), None

@@ -17,6 +17,7 @@ from .placed_face import place_face, run
 from .pose_search import LOOKING
 from .shape_space import shape_space
 from .sure import SURE
+from .under_hair import fit_under_hair, hair_over, in_face
 from .verdict import misfit_of
 
 #: Landmarks that the shape tells better than the range map.
@@ -70,13 +71,16 @@ def find_landmarks(mesh: Mesh, reference: Head | None = None, unit_scales=(1.0,)
     yield Progress(0.05, LOOKING)
     scale, fit, target = yield from portion(place_face(mesh, reference, space, unit_scales), 0.05, 0.8)
     misfit = misfit_of(space, fit)
-    fit, shown = yield from run(fit_expression(space, target, fit), 0.8, 0.9, "Looking at lips and lids")
+    fit, shown = yield from run(fit_expression(space, target, fit), 0.8, 0.88, "Looking at lips and lids")
+    hair = yield from run(fit_under_hair(space, target, fit, shown), 0.88, 0.9, "Looking for hair")
+    fit = hair.fit
     positions = picked(space, fit, target)
     confidence, mid_air, missing = judge(space, fit, target, positions)
     positions = {n: p for n, p in positions.items() if n not in missing}
     confidence = {n: confidence[n] for n in positions}
-    seen = Mesh.from_triangles(target.vertices, target.triangles)
-    other = yield from portion(weighed(seen, positions, confidence, reference, target), 0.9, 1.0)
+    bare = target.without(hair_over(space, fit, target, hair.covered & ~in_face(space, fit, {}, 0.0)))
+    seen = Mesh.from_triangles(bare.vertices, bare.triangles)
+    other = yield from portion(weighed(seen, positions, confidence, reference, bare), 0.9, 1.0)
     positions = {n: p if n.partition("_")[0] in OWN else other[n] for n, p in positions.items()}
     lids = meeting_lids(space, fit, target, shown.shut) | shown.lids
     lids = {n: p for n, p in lids.items() if n in positions}

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A first look at a scan with the landmarks given: a plausible head laid on it tells what they do not.
 
-Where lids are, and what hangs out of the mouth and is no skin.
+Where lids are, what hangs out of the mouth and is no skin, and what is hair.
 """
 
 from dataclasses import dataclass, field, replace
@@ -22,24 +22,26 @@ from .placed_face import run
 from .pose_search import Pose
 from .shape_fit import NoFaceError, fit_shape
 from .shape_space import shape_space
+from .under_hair import fit_under_hair, hair_over, in_face
 
 LOOKING = "Looking at lids and lips"
 SKULL = ("v", "op")
+BESIDE_FACE = 11.0  # mm from the face's outline: what lies within is as scanned, be it hair
 FEWEST = 4  # landmarks that tell where the head is
 
 
 @dataclass(frozen=True, eq=False)
 class FirstLook:
     """landmarks : name -> (3,) mm, those given and those of lids that are seen; lips : about where their landmarks are if
-    they are parted, if only a little, or None; target : the scan without what the lips hold; held_mm2 : how much of it that
-    is; filled : with skin behind it, as it probably is; hidden (k,) : vertices of the reference's skin that make that up;
-    skull : name -> (3,) mm, about where landmarks of the skull are that were not given."""
+    they are parted, if only a little, or None; target : the scan without what the lips hold and hair; left_out : how much of
+    it that is, mm²; filled : with skin behind it, as it probably is; hidden (k,) : vertices of the reference's skin that make
+    that up; skull : name -> (3,) mm, about where landmarks of the skull are that were not given."""
 
     landmarks: dict[str, np.ndarray]
     target: Surface
     filled: Surface
     lips: dict[str, np.ndarray] | None = None
-    held_mm2: float = 0.0
+    left_out: dict[str, float] = field(default_factory=lambda: {"held_by_lips": 0.0, "hair": 0.0})
     hidden: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
     skull: dict[str, np.ndarray] = field(default_factory=dict)
 
@@ -55,7 +57,7 @@ class FirstLook:
 def first_look(reference: Head, target: Surface, given: dict[str, np.ndarray], keep_held: bool = False) -> Work:
     """Work returning the `FirstLook` at the scan ``target`` with the landmarks ``given`` (name -> (3,) mm).
 
-    keep_held : what the lips hold is to be taken for skin
+    keep_held : what the lips hold, and hair, is to be taken for skin
     """
     rest = reference.landmark_positions()
     names = [name for name in given if name in rest]
@@ -66,17 +68,23 @@ def first_look(reference: Head, target: Surface, given: dict[str, np.ndarray], k
     scale = np.cbrt(np.linalg.det(matrix))
     try:
         fit = yield from run(fit_shape(space, coarse, Pose(scale, matrix / scale, shift, 0.0)), 0.0, 0.6, LOOKING)
-        fit, shown = yield from run(fit_expression(space, coarse, fit), 0.6, 1.0, LOOKING)
+        fit, shown = yield from run(fit_expression(space, coarse, fit), 0.6, 0.9, LOOKING)
+        hair = yield from run(fit_under_hair(space, coarse, fit, shown, given), 0.9, 1.0, LOOKING)
     except NoFaceError:
         return FirstLook(given, target, target)
     landmarks = given | lids_told(space, fit, shown, coarse, given)
     laid = space.landmarks(fit.points)
     lips = {name: laid[name] for name in MARKS} if shown.parted else None
+    laid = space.landmarks(hair.fit.points)
     skull = {name: laid[name] for name in SKULL if name in laid and name not in given}
     if keep_held:
         return FirstLook(landmarks, target, target, lips, skull=skull)
     held = held_by_lips(space, fit, target)
-    left = target.without(held)
+    covered = hair.covered & ~in_face(space, hair.fit, given, BESIDE_FACE)
+    shows = hair_over(space, hair.fit, target, covered)
+    left = target.without(held | shows)
     hidden = hidden_skin(space, fit, target.vertices[target.triangles[held].ravel()], left)
     filled = with_hidden_skin(space, fit, hidden, left)
-    return FirstLook(landmarks, left, filled, lips, float(target.area[held].sum()), space.vertices[hidden], skull)
+    filled = with_hidden_skin(space, hair.fit, covered, filled)
+    out = {"held_by_lips": float(target.area[held].sum()), "hair": float(target.area[shows].sum())}
+    return FirstLook(landmarks, left, filled, lips, out, space.vertices[hidden | covered], skull)

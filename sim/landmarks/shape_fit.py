@@ -38,6 +38,8 @@ HAIR = 0.05
 #: mm off such skin from which on it is hair; depth of hair and its standard deviation, mm.
 BALD, DEEP = 6.0, (10.0, 10.0)
 STANDS_OFF = 35.0  # mm: so far hair may
+#: The same of hair that is known to be. It is as deep all over a head: much of it tells no more of that than little.
+SEEN_DEEP = (13.0, 18.0)
 PATCH = 40.0  # mm²: so much of the surface says one thing
 TOLD = 1.0  # mm by which a place that is told may be wrong
 TILT = 0.05  # rad of turn, and fraction of size, that count as much as 1 standard deviation
@@ -114,11 +116,13 @@ def fit_shape(
     every=1,
     expression=REST,
     told: Told | None = None,
+    hair=None,
 ):
     """A generator: yields the fraction done, returns the `ShapeFit` that begins at ``pose``.
 
     coefficients (k,) : to begin with, of the first k modes; every : look at each so many-th point of the skin only;
-    expression : what lips and lids are taken to do; told : what is known besides (None: nothing)
+    expression : what lips and lids are taken to do; told : what is known besides (None: nothing); hair (n,) bool : points
+    that are known to lie under hair
 
     Raises
     ------
@@ -131,14 +135,15 @@ def fit_shape(
     usual = sum((space.shut[side] for side in expression.shut), np.zeros(m))
     usual += expression.parted * space.parted
     looking = np.arange(len(space.points))[::every]
-    area = space.area / PATCH * np.where(space.hairy, HAIR, 1.0)
+    hairy = space.hairy if hair is None else space.hairy | hair
+    area = space.area / PATCH * np.where(hairy, HAIR, 1.0)
     for done, (variance, reach, width, noise) in enumerate(rounds):
         shaped = space.shaped(coefficients)
         points = scale * shaped @ turn.T + shift
-        found, trust, normals = pairs(space, points, target, reach * scale, looking[~space.hairy[looking]])
-        above = pairs(space, points, target, max(reach, STANDS_OFF) * scale, looking[space.hairy[looking]])
+        found, trust, normals = pairs(space, points, target, reach * scale, looking[~hairy[looking]])
+        above = pairs(space, points, target, max(reach, STANDS_OFF) * scale, looking[hairy[looking]])
         for whole, part in zip((found, trust, normals), above, strict=True):
-            whole[space.hairy] = part[space.hairy]
+            whole[hairy] = part[hairy]
         use = np.flatnonzero(trust > 0)
         if len(use) * every < LEAST:
             raise NoFaceError
@@ -148,9 +153,13 @@ def fit_shape(
         height = np.einsum("ij,ij->i", gap, across)
         weight = every * trust[use] * area[use] / (1 + (height / width) ** 2) ** 2 / noise**2
         # What stands off hairy skin is hair of some depth, whatever the round.
-        hair = space.hairy[use] & (height > BALD)
-        weight[hair] = every * (trust * area)[use][hair] / DEEP[1] ** 2
-        gap[hair] -= DEEP[0] * across[hair]
+        deep = space.hairy[use] & (height > BALD)
+        weight[deep] = every * (trust * area)[use][deep] / DEEP[1] ** 2
+        gap[deep] -= DEEP[0] * across[deep]
+        if hair is not None:
+            deep = hair[use]
+            weight[deep] = every * (trust * area)[use][deep] / SEEN_DEEP[1] ** 2
+            gap[deep] = place[deep] - shaped[use][deep] - SEEN_DEEP[0] * across[deep]
         # Unknowns: a small turn about the face, a shift, a change of size, and the coefficients.
         rows = np.concatenate([_rigid(shaped[use] - middle), space.modes[use]], axis=2)
         right = gap + space.modes[use] @ coefficients

@@ -1,0 +1,159 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Hair of the head: a scanner sees it as a rough surface off the scalp, and it is no skin.
+
+Where hair can grow, hair is what is rougher than skin, and than the same scan's forehead: its normals vary against those of
+a plausible head laid on the scan (`shape_fit`). So is what stands off that head as far as no skull does. If hair hides an ear,
+it hides what lies about that ear as well, outside of the face. Laid on the scan again, in the knowledge of what is hair, that
+head tells where the scalp probably lies below.
+"""
+
+from collections.abc import Collection
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import csr_matrix
+from scipy.spatial import cKDTree
+
+from ..adapt.closest import Surface
+from ..adapt.ears import EAR_MARKS
+from ..adapt.scan_surface import cuts_of
+from ..scan.flat_cuts import beyond
+from .confidence import LIKE_AN_EAR, like_ears
+from .shape_fit import CHANGE, STANDS_OFF, Expression, ShapeFit, Told, fit_shape
+from .shape_space import ShapeSpace
+
+MANY = 24_000  # triangles of the scan that tell
+AROUND = 14.0  # mm about such a place in which a scan is rough or not
+MOSTLY = 9.0  # mm about a point of the skin in which it is hair for the most part
+FROM_EAR = 12.0  # mm: nearer than this to an ear its folds are rough
+#: rad by which normals vary, and that in terms of the forehead's.
+ROUGH, ROUGHER = 0.14, 1.5
+HIGH = 8.0  # mm by which no skull stands off the head laid on it
+SMOOTH = 25  # per cent of a forehead that are smoother than skin is: hair falls on the rest of some
+LEAST = 0.15  # share of all hairy skin: fewer specks are no hair
+WITH_EARS = 60.0  # mm about an ear under hair that is under hair as well, outside of the face
+EDGE = -8.0  # mm from the outline of a face that is read from hair beside it, within which it is face
+INNER = -20.0  # mm from that outline within which no hair led the fit astray
+OFF = 4.0  # mm by which hair stands off there
+
+
+@dataclass(frozen=True, eq=False)
+class UnderHair:
+    """fit : the `ShapeFit` of a head to a scan of which it is known what is hair; covered (n,) bool : the points of its skin
+    over which that is."""
+
+    fit: ShapeFit
+    covered: np.ndarray
+
+
+def fit_under_hair(space: ShapeSpace, target: Surface, fit: ShapeFit, shown: Expression, given: Collection[str] = ()):
+    """A generator: yields the fraction done, returns `UnderHair`, with ``fit`` itself where the scan ``target`` shows no hair.
+
+    shown : the expression of ``fit``; given : names of landmarks that are known: an ear that has any is no hair
+    """
+    covered = under_hair(space, fit, target)
+    if not covered.any():
+        return UnderHair(fit, covered)
+    about = beside_hidden_ears(space, fit, target, given) & ~in_face(space, fit, {}, EDGE)
+    bare = np.flatnonzero(in_face(space, fit, {}, INNER))
+    held = Told(np.repeat(bare[:, None], 3, axis=1), np.full((len(bare), 3), 1 / 3), fit.points[bare])
+    fit = yield from fit_shape(space, target, fit.pose, CHANGE, fit.coefficients, 1, shown, held, covered | about)
+    _, near, _, high = over(fit, space, target)
+    many = np.bincount(near[near >= 0], minlength=len(covered))
+    most = np.bincount(near[near >= 0], high[near >= 0] > OFF * fit.pose.scale, len(covered)) > 0.5 * many
+    return UnderHair(fit, covered | about & most)
+
+
+def beside_hidden_ears(space: ShapeSpace, fit: ShapeFit, target: Surface, given: Collection[str]) -> np.ndarray:
+    """(n,) bool: the points of the skin about ears that the scan does not show and that have no landmark ``given``."""
+    likeness = like_ears(space, fit, target)
+    about = np.zeros(len(fit.points), dtype=bool)
+    for side, sign in (("l", 1), ("r", -1)):
+        if likeness[side] < LIKE_AN_EAR and not any(f"{name}_{side}" in given for name in EAR_MARKS):
+            ear = space.points[(space.ear > 0.3) & (sign * space.points[:, 0] > 0)]
+            about |= cKDTree(ear).query(space.points)[0] < WITH_EARS
+    return about
+
+
+def under_hair(space: ShapeSpace, fit: ShapeFit, target: Surface) -> np.ndarray:
+    """(n,) bool: the points of the skin over which the scan ``target`` shows hair."""
+    size = fit.pose.scale
+    away = cKDTree(space.points[space.ear > 0.3]).query(space.points)[0] > FROM_EAR
+    bare = forehead(space)
+    covered = np.zeros(len(fit.points), dtype=bool)
+    coarse = target.coarser()
+    middle, near, off, high = over(fit, space, coarse, slice(None, None, max(len(coarse.triangles) // MANY, 1)))
+    # At right angles at most, and not on flat ends.
+    facing = (near >= 0) & ((off**2).sum(axis=1) < 2.0) & ~beyond(cuts_of(target), middle)
+    middle, near, off, high = middle[facing], near[facing], off[facing], high[facing]
+    look, plain = (space.hairy & away)[near], bare[near]
+    if not look.any():
+        return covered
+    rough = varied(middle[look], off[look], AROUND * size)
+    usual = np.percentile(varied(middle[plain], off[plain], AROUND * size), SMOOTH) if plain.any() else 0.0
+    at = np.flatnonzero(space.hairy)
+    link = within(fit.points[at], fit.points[near[look]], MOSTLY * size)
+    count = np.maximum(np.asarray(link.sum(axis=1)).ravel(), 1)
+    hair = (rough > max(ROUGH, ROUGHER * usual)) | (high[look] > HIGH * size)
+    covered[at] = link @ hair / count > 0.5
+    if space.area[covered].sum() < LEAST * space.area[space.hairy].sum():
+        covered[:] = False
+    return covered
+
+
+def hair_over(space: ShapeSpace, fit: ShapeFit, target: Surface, covered) -> np.ndarray:
+    """(m,) bool: the triangles of the scan over the points ``covered`` (n,) bool of the skin."""
+    if not covered.any():
+        return np.zeros(len(target.triangles), dtype=bool)
+    near = over(fit, space, target)[1]
+    return (near >= 0) & covered[near]
+
+
+def over(fit: ShapeFit, space: ShapeSpace, surface: Surface, triangles=slice(None)):
+    """Of ``triangles`` of a surface: their middles (k, 3) mm, the points of the skin (k,) nearest to them, -1 where none is
+    near, how their normals differ from the skin's (k, 3), and mm by which they stand off it (k,)."""
+    skin = Surface(fit.points, space.triangles)
+    own = cKDTree(fit.points).query(skin.vertices)[1]  # a surface numbers its vertices anew
+    middle = surface.vertices[surface.triangles[triangles]].mean(axis=1)
+    found = skin.closest(middle, STANDS_OFF * fit.pose.scale)
+    near = np.full(len(middle), -1)
+    use = found.found & ~found.border
+    near[use] = own[skin.triangles[found.triangle[use], found.weights[use].argmax(axis=1)]]
+    high = np.einsum("ij,ij->i", middle - found.points, found.normals)
+    return middle, near, surface.face_normals[triangles] - found.normals, np.where(use, high, 0.0)
+
+
+def in_face(space: ShapeSpace, fit: ShapeFit, given, margin: float) -> np.ndarray:
+    """(n,) bool: the points of the skin whose frontal projection lies, by a ``margin`` of mm, in the ellipse through zygia,
+    trichion and gnathion: those of the landmarks ``given``, else as the ``fit`` has them."""
+    back, size, shift = fit.pose.turn, fit.pose.scale, fit.pose.shift
+    own = (fit.points - shift) @ back / size
+    marks = space.landmarks(own) | {name: (place - shift) @ back / size for name, place in given.items()}
+    left, right, top, bottom = (marks[name] for name in ("zy_l", "zy_r", "tr", "gn"))
+    across = (own[:, 0] - (left[0] + right[0]) / 2) / ((left[0] - right[0]) / 2 + margin)
+    up = (own[:, 2] - (top[2] + bottom[2]) / 2) / ((top[2] - bottom[2]) / 2 + margin)
+    front = own[:, 1] < min(marks["t_l"][1], marks["t_r"][1])
+    return (across**2 + up**2 < 1) & front
+
+
+def forehead(space: ShapeSpace) -> np.ndarray:
+    """(n,) bool: the points of the skin above the brows, below the scalp."""
+    marks = space.landmarks(space.points)
+    above = max(marks["sci_l"][2], marks["sci_r"][2])
+    return (space.face > 0.5) & (space.points[:, 2] > above) & ~space.hairy
+
+
+def within(points, others, radius: float) -> csr_matrix:
+    """(k, j) sparse, 1 where one of ``points`` (k, 3) and one of the ``others`` (j, 3) are no farther apart than that."""
+    lists = cKDTree(others).query_ball_point(points, radius)
+    ends = np.cumsum([len(i) for i in lists])
+    columns = np.concatenate([np.asarray(i, dtype=int) for i in lists])
+    return csr_matrix((np.ones(len(columns)), columns, np.r_[0, ends]), shape=(len(points), len(others)))
+
+
+def varied(points, off, radius: float) -> np.ndarray:
+    """(k,) rad by which the differences ``off`` (k, 3) of normals vary about each of ``points`` (k, 3)."""
+    link = within(points, points, radius)
+    count = np.maximum(np.asarray(link.sum(axis=1)).ravel(), 1)
+    mean, square = link @ off / count[:, None], link @ (off**2).sum(axis=1) / count
+    return np.sqrt(np.maximum(square - (mean**2).sum(axis=1), 0))
