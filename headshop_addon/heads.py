@@ -39,7 +39,7 @@ def create_head(
     Parameters
     ----------
     scan_object : the scan it was made from; linked into the collection and left out of renders
-    attributes : per-vertex values (n,) kept on the skin, such as ``fitted`` (bool) and ``distance_mm`` (float)
+    attributes : per-vertex values (n,) kept on the skin, such as ``fitted`` and ``distance_mm`` (float)
     """
     scene = scene or bpy.context.scene
     collection = bpy.data.collections.new(name)

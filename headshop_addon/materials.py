@@ -15,7 +15,7 @@ from . import bridge, heads
 from .anatomy_materials import FIBRE, REST, anatomy_material
 from .detail_images import images_of
 from .eye_materials import EYE, IRIS, IRIS_COLOUR, eye_material
-from .scan_colour import ScanColour, colour_image, iris_colour
+from .scan_colour import ScanColour, colour_image, iris_colour, unseen_skin
 from .skin_material import COLOUR, skin_material
 from .skin_paint import paint_skin, write_vectors
 
@@ -48,7 +48,9 @@ def dressing(skin: bpy.types.Object) -> Work:
         if part == "skin":
             yield Progress(0.1, "Painting the skin")
             paint_skin(obj, mesh, head.groups, place, {n: axes @ p for n, p in head.landmark_positions().items()})
-            own = yield from portion(_own_skin(skin, mesh, scan, head.groups["inner"]), 0.2, 0.85)
+            hidden = bridge.read_attribute(skin.data, "hidden")
+            unseen = head.groups["inner"] if hidden is None else unseen_skin(mesh, head.groups["inner"], hidden)
+            own = yield from portion(_own_skin(skin, mesh, scan, unseen), 0.2, 0.85)
             yield Progress(0.85, "Dressing the head")
         elif part in ("eye_l", "eye_r"):
             write_vectors(obj.data, EYE, eye_coordinates(mesh, head.eyes[part == "eye_r"], axes[2]))
@@ -89,12 +91,12 @@ def _coloured_scan(skin: bpy.types.Object) -> Mesh | None:
     return seen.moved(seen.vertices @ matrix[:3, :3].T + matrix[:3, 3] / bridge.METRES)
 
 
-def _own_skin(skin: bpy.types.Object, mesh: Mesh, scan: Mesh | None, inner: np.ndarray) -> Work:
+def _own_skin(skin: bpy.types.Object, mesh: Mesh, scan: Mesh | None, unseen: np.ndarray) -> Work:
     """Work returning a skin material of the head's own with its scan's colours and fine detail; None if there is
     neither."""
     name, image = heads.head_name(skin), None
     if scan is not None:
-        painted = yield from colour_image(mesh, ScanColour(scan), inner, f"{name} Colour")
+        painted = yield from colour_image(mesh, ScanColour(scan), unseen, f"{name} Colour")
         if painted is not None:
             image, colour = painted
             write_vectors(skin.data, COLOUR, np.column_stack([colour, np.ones(len(colour))]))

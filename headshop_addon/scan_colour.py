@@ -88,13 +88,20 @@ def iris_colour(scan: Mesh, eyes) -> np.ndarray | None:
     return found * np.clip(found @ LUMINANCE, 0.03, 0.16) / max(found @ LUMINANCE, 1e-4)
 
 
-def vertex_colour(skin: Mesh, source: ScanColour, inner: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+def unseen_skin(skin: Mesh, inner: np.ndarray, hidden: np.ndarray) -> np.ndarray:
+    """(n,) 0..1, skin whose colour no scan tells: what is ``inner`` (n,) 0..1, what is ``hidden`` (n,) bool, under hair for
+    one, and what is next to that, for there the scan shows the hair."""
+    beside = adjacency(skin) @ hidden.astype(float) > 0
+    return np.where(hidden | beside, 1.0, inner)
+
+
+def vertex_colour(skin: Mesh, source: ScanColour, unseen: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
     """Linear colour (n, 3) of each skin vertex and the gain (n,) that evens the light; None if the scan is elsewhere.
 
-    inner : (n,) 0..1, what no scanner sees
+    unseen : (n,) 0..1, what no scanner sees, see `unseen_skin`
     """
     colour, confidence = source.at(skin.vertices, vertex_normals(skin.vertices, skin.triangles))
-    confidence = confidence * (1 - np.clip(inner, 0, 1))
+    confidence = confidence * (1 - np.clip(unseen, 0, 1))
     if (confidence > 0.5).sum() < 0.05 * len(confidence):
         return None
     link = adjacency(skin)
@@ -136,13 +143,13 @@ def texels(skin: Mesh, size: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return index, corners[np.concatenate(owner)[first]], np.concatenate(inside)[first]
 
 
-def colour_image(skin: Mesh, source: ScanColour, inner: np.ndarray, name: str, size: int | None = None) -> Work:
+def colour_image(skin: Mesh, source: ScanColour, unseen: np.ndarray, name: str, size: int | None = None) -> Work:
     """Work painting the scan's colours on the skin's UV map: (packed image, linear colour (n, 3) per vertex) or None.
 
     None if the scan has no part near the skin, or the skin has no UV map.
     """
     yield Progress(0.0, "Painting the skin")
-    found = vertex_colour(skin, source, inner)
+    found = vertex_colour(skin, source, unseen)
     if found is None or skin.uv is None:
         return None
     colour, gain = found
@@ -151,7 +158,7 @@ def colour_image(skin: Mesh, source: ScanColour, inner: np.ndarray, name: str, s
     index, corners, weights = texels(skin, size)
     normals = vertex_normals(skin.vertices, skin.triangles)
 
-    places, facing, hidden = skin.vertices, normals, np.clip(inner, 0, 1)
+    places, facing, hidden = skin.vertices, normals, np.clip(unseen, 0, 1)
     painted = np.empty((len(index), 3))
     for start in range(0, len(index), BLOCK):
         yield Progress(0.3 + 0.6 * start / len(index), "Painting the skin")

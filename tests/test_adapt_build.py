@@ -99,6 +99,7 @@ def test_attributes_tell_fitted_from_invented(built, subject):
     assert attributes["fitted"].min() >= 0 and attributes["fitted"].max() <= 1
     back = vertices[:, 1] > 60
     assert (attributes["fitted"][back] == 0).all() and np.isnan(attributes["distance_mm"][back]).all()
+    assert attributes["hidden"].dtype == bool and not attributes["hidden"][attributes["fitted"] > 0.3].any()
     known = attributes["fitted"] > 0
     assert np.isfinite(attributes["distance_mm"][known]).all()
     assert np.nanpercentile(np.abs(attributes["distance_mm"]), 95) < 1.0

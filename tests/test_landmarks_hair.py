@@ -188,6 +188,9 @@ def test_the_scalp_under_hair_is_invented_where_it_probably_is(reference, shaggy
     real = vertex_normals(whole, skin.triangles)[scalp]
     assert rough < 1.3 * np.degrees(np.arccos(np.clip((real[near[:, 1:]] * real[:, None]).sum(axis=2), -1, 1))).mean()
     assert built.attributes["fitted"][scalp].mean() < 0.2
+    hidden = built.attributes["hidden"]
+    assert hidden.dtype == bool and hidden[scalp].mean() > 0.8
+    assert not hidden[np.linalg.norm(places - truth["prn"], axis=1) < 60].any()
     assert "left out: hair;" in built.fit["sentence"] and "scalp" in built.fit["sentence"]
     face = (reference.groups["face"] > 0.5) & (reference.groups["inner"] < 0.5)
     assert below.closest(places[face]).distance.mean() < 0.3

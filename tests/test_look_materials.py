@@ -107,6 +107,22 @@ def test_the_scans_colours_arrive_and_spread_where_it_has_none(reference):
     assert 0.05 < colour[nearest["op"]].min() and colour[nearest["op"]].max() < 0.45
 
 
+def test_hair_does_not_stain_the_skin_below(reference):
+    from headshop.headshop_addon.scan_colour import ScanColour, to_linear, to_srgb, unseen_skin, vertex_colour
+
+    skin, scalp = reference.skin, reference.groups["scalp"] > 0.5
+    scan = _coloured_scan(reference)
+    linear = to_linear(scan.colour)
+    linear[scalp] = 0.01  # hair
+    scan = scan.__class__.from_triangles(scan.vertices, scan.triangles, colour=to_srgb(linear).astype(np.float32))
+    inner = reference.groups["inner"]
+    dark, _ = vertex_colour(skin, ScanColour(scan), inner)
+    skinny, _ = vertex_colour(skin, ScanColour(scan), unseen_skin(skin, inner, scalp))
+    front = scalp & (skin.vertices[:, 1] < -40)
+    assert dark[front].max(axis=1).mean() < 0.08
+    assert skinny[front].max(axis=1).min() > 0.2
+
+
 def test_a_speck_beside_the_skin_leaves_no_spot(reference):
     pytest.importorskip("bpy")
     from headshop.headshop_addon.scan_colour import ScanColour

@@ -44,7 +44,7 @@ class BuildResult:
     anatomy : muscles (count), skull_penetrations (bone vertices outside the skin), tissue_thickness_mm
     landmarks_missing : names of landmarks that were not given
     attributes : per skin vertex (n,) float32: ``fitted`` 0..1 (0: invented by the warp), ``distance_mm`` to the scan
-        (positive outside, NaN where there is no data)
+        (positive outside, NaN where there is no data); and (n,) bool ``hidden``, under hair or behind what the lips hold
     detail : displacement and normal map of what is finer than the mesh; None if not asked for
     scanned : (n, 3) mm, the head's skin with the expression that it was scanned with; None where it was not relaxed
     """
@@ -120,6 +120,7 @@ def build_head(
     attributes = {
         "fitted": fit.fitted.fitted.astype(np.float32),
         "distance_mm": fit.fitted.distance.astype(np.float32),
+        "hidden": fit.unseen | np.isin(np.arange(len(fit.cage)), look.hidden),
     }
     maps = None
     if detail and head.skin.uv is not None:
