@@ -16,7 +16,7 @@ from headshop.sim.landmarks.first_look import first_look
 from headshop.sim.landmarks.pose_search import Pose
 from headshop.sim.landmarks.shape_fit import ShapeFit
 from headshop.sim.landmarks.shape_space import shape_space
-from headshop.sim.landmarks.under_hair import beside_hidden_ears, hair_over, in_face, under_hair
+from headshop.sim.landmarks.under_hair import about_ears, ear_found, hair_over, in_face, under_hair
 from headshop.sim.mesh import Mesh, vertex_normals
 from headshop.sim.mesh_subdivision import drawn
 from headshop.sim.progress import finish
@@ -202,16 +202,32 @@ def laid(space, points):
     return ShapeFit(points, none[:1], Pose(1.0, np.eye(3), none[:3], 0.0), none + 1, none, np.zeros((1, 1)))
 
 
-def test_hair_hides_what_lies_about_ears_that_it_hides(reference):
+def test_ears_are_seen_where_they_are_expected(reference):
     space = shape_space(reference)
-    fit = laid(space, space.points)
-    bare = Surface(space.points, space.triangles)
-    assert not beside_hidden_ears(space, fit, bare, ()).any()
-    left = (space.points[:, 0] > 0) & (cKDTree(space.points[space.ear > 0.3]).query(space.points)[0] < 25)
-    hidden = bare.without(left[space.triangles].any(axis=1))  # nothing of the left ear can be seen
-    about = beside_hidden_ears(space, fit, hidden, ())
-    assert about[left].all() and not about[space.points[:, 0] < -50].any()
-    assert not beside_hidden_ears(space, fit, hidden, ("sa_l",)).any()  # somebody says where it is
+    fit, bare = laid(space, space.points), Surface(space.points, space.triangles)
+    assert ear_found(space, fit, bare, "l") == ear_found(space, fit, bare, "r") == 1
+    left = about_ears(space, "l")
+    assert left[space.ear > 0.3].mean() == pytest.approx(0.5, abs=0.05) and not left[space.points[:, 0] < -40].any()
+    normals = vertex_normals(space.points, space.triangles)
+    hair = Surface(space.points + np.where(left[:, None], 20.0 * normals, 0), space.triangles)
+    assert ear_found(space, fit, hair, "l") < 0.7 and ear_found(space, fit, hair, "r") == 1
+
+
+def test_hair_over_an_ear_hides_what_lies_about_it(reference):
+    """Whoever has hair over one ear only has a head as wide on that side as on the other."""
+    scan, whole, truth = grown(reference, shag)
+    space = shape_space(reference)
+    near = cKDTree(whole[(np.asarray(reference.groups["ear_l"]) > 0.3)]).query(scan.vertices)[0]
+    lock = np.clip((40 - near) / 15, 0, 1) * (scan.vertices[:, 1] > truth["t_l"][1] - 15)
+    points = scan.vertices + [26.0, 0, 0] * lock[:, None]
+    scan = surface_of(Mesh.from_triangles(points, scan.triangles))
+    given = {n: p for n, p in of_face(truth).items() if n.partition("_")[0] not in EAR_MARKS}
+    look = finish(first_look(reference, scan, given))
+    ears = {s: space.vertices[(space.ear > 0.3) & ((space.points[:, 0] > 0) == (s == "l"))] for s in "lr"}
+    hidden = {s: np.isin(ears[s], look.hidden).mean() for s in "lr"}
+    assert hidden["l"] > 0.8 and hidden["r"] < 0.05
+    told = finish(first_look(reference, scan, of_face(truth)))  # somebody says where the ears are
+    assert np.isin(ears["l"], told.hidden).mean() < 0.05
 
 
 def test_the_face_is_no_hair(reference):

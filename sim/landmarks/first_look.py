@@ -22,11 +22,11 @@ from .placed_face import run
 from .pose_search import Pose
 from .shape_fit import NoFaceError, fit_shape
 from .shape_space import shape_space
-from .under_hair import fit_under_hair, hair_over, in_face
+from .under_hair import EAR, fit_under_hair, hair_over, in_face
 
 LOOKING = "Looking at lids and lips"
 SKULL = ("v", "op")
-BESIDE_FACE = 11.0  # mm from the face's outline: what lies within is as scanned, be it hair
+BESIDE_FACE = 11.0  # mm from the face's outline: what lies within and may be skin is as scanned
 FEWEST = 4  # landmarks that tell where the head is
 
 
@@ -81,10 +81,11 @@ def first_look(reference: Head, target: Surface, given: dict[str, np.ndarray], k
         return FirstLook(landmarks, target, target, lips, skull=skull)
     held = held_by_lips(space, fit, target)
     covered = hair.covered & ~in_face(space, hair.fit, given, BESIDE_FACE)
+    covered |= hair.far & ~in_face(space, hair.fit, given, 0.0)
     shows = hair_over(space, hair.fit, target, covered)
     left = target.without(held | shows)
     hidden = hidden_skin(space, fit, target.vertices[target.triangles[held].ravel()], left)
     filled = with_hidden_skin(space, fit, hidden, left)
-    filled = with_hidden_skin(space, hair.fit, covered, filled)
+    filled = with_hidden_skin(space, hair.fit, covered & (space.ear < EAR), filled)  # ears take the reference's shape
     out = {"held_by_lips": float(target.area[held].sum()), "hair": float(target.area[shows].sum())}
     return FirstLook(landmarks, left, filled, lips, out, space.vertices[hidden | covered], skull)

@@ -25,12 +25,17 @@ from .shape_space import ShapeSpace
 MANY = 24_000  # triangles of the scan that tell
 AROUND = 14.0  # mm about such a place in which a scan is rough or not
 MOSTLY = 9.0  # mm about a point of the skin in which it is hair for the most part
+EAR = 0.3  # of `ShapeSpace.ear` from which on skin is an ear
 FROM_EAR = 12.0  # mm: nearer than this to an ear its folds are rough
 #: rad by which normals vary, and that in terms of the forehead's.
 ROUGH, ROUGHER = 0.14, 1.5
 HIGH = 8.0  # mm by which no skull stands off the head laid on it
 SMOOTH = 25  # per cent of a forehead that are smoother than skin is: hair falls on the rest of some
 LEAST = 0.15  # share of all hairy skin: fewer specks are no hair
+NEAR_EAR = 8.0  # mm from an ear that is guessed to one that is seen
+#: Share of an ear by which the scan lies, if it is seen: .98 and more of ten ears beside hair; of six under it .94, five less
+#: than .67.
+FOUND = 0.85
 WITH_EARS = 60.0  # mm about an ear under hair that is under hair as well, outside of the face
 EDGE = -8.0  # mm from the outline of a face that is read from hair beside it, within which it is face
 INNER = -20.0  # mm from that outline within which no hair led the fit astray
@@ -40,10 +45,11 @@ OFF = 4.0  # mm by which hair stands off there
 @dataclass(frozen=True, eq=False)
 class UnderHair:
     """fit : the `ShapeFit` of a head to a scan of which it is known what is hair; covered (n,) bool : the points of its skin
-    over which that is."""
+    over which that is; far (n,) bool : those from which it stands off as no skin does."""
 
     fit: ShapeFit
     covered: np.ndarray
+    far: np.ndarray
 
 
 def fit_under_hair(space: ShapeSpace, target: Surface, fit: ShapeFit, shown: Expression, given: Collection[str] = ()):
@@ -53,32 +59,62 @@ def fit_under_hair(space: ShapeSpace, target: Surface, fit: ShapeFit, shown: Exp
     """
     covered = under_hair(space, fit, target)
     if not covered.any():
-        return UnderHair(fit, covered)
-    about = beside_hidden_ears(space, fit, target, given) & ~in_face(space, fit, {}, EDGE)
+        return UnderHair(fit, covered, covered)
     bare = np.flatnonzero(in_face(space, fit, {}, INNER))
     held = Told(np.repeat(bare[:, None], 3, axis=1), np.full((len(bare), 3), 1 / 3), fit.points[bare])
-    fit = yield from fit_shape(space, target, fit.pose, CHANGE, fit.coefficients, 1, shown, held, covered | about)
-    _, near, _, high = over(fit, space, target)
-    many = np.bincount(near[near >= 0], minlength=len(covered))
-    most = np.bincount(near[near >= 0], high[near >= 0] > OFF * fit.pose.scale, len(covered)) > 0.5 * many
-    return UnderHair(fit, covered | about & most)
+    outside = ~in_face(space, fit, {}, EDGE)
 
+    def without(sides):
+        """The work of a fit that knows nothing of the ears of these ``sides``, and the points of skin about those."""
+        about = about_ears(space, sides) & outside
+        hair = covered | about
+        return fit_shape(space, target, fit.pose, CHANGE, fit.coefficients, 1, shown, held, hair), about
 
-def beside_hidden_ears(space: ShapeSpace, fit: ShapeFit, target: Surface, given: Collection[str]) -> np.ndarray:
-    """(n,) bool: the points of the skin about ears that the scan does not show and that have no landmark ``given``."""
+    unsure = [side for side in "lr" if not any(f"{name}_{side}" in given for name in EAR_MARKS)]
     likeness = like_ears(space, fit, target)
-    about = np.zeros(len(fit.points), dtype=bool)
-    for side, sign in (("l", 1), ("r", -1)):
-        if likeness[side] < LIKE_AN_EAR and not any(f"{name}_{side}" in given for name in EAR_MARKS):
-            ear = space.points[(space.ear > 0.3) & (sign * space.points[:, 0] > 0)]
-            about |= cKDTree(ear).query(space.points)[0] < WITH_EARS
+    work, about = without(unsure)
+    guessed = yield from work
+    hidden = [
+        side for side in unsure if likeness[side] < LIKE_AN_EAR or ear_found(space, guessed, target, side) < FOUND
+    ]
+    if hidden != unsure:
+        work, about = without(hidden)
+        guessed = yield from work
+    fit = guessed
+    _, near, _, high = over(fit, space, target)
+    near, high = near[near >= 0], high[near >= 0] / fit.pose.scale
+    off, far = (
+        np.bincount(near, high > least, len(covered)) > 0.5 * np.bincount(near, minlength=len(covered))
+        for least in (OFF, HIGH)
+    )
+    covered |= off & (about | space.hairy)
+    for side in hidden:
+        covered |= _ear(space, side)
+    return UnderHair(fit, covered, covered & far)
+
+
+def about_ears(space: ShapeSpace, sides: Collection[str]) -> np.ndarray:
+    """(n,) bool: the points of the skin about the ears of ``sides``."""
+    about = np.zeros(len(space.points), dtype=bool)
+    for side in sides:
+        about |= cKDTree(space.points[_ear(space, side)]).query(space.points)[0] < WITH_EARS
     return about
+
+
+def ear_found(space: ShapeSpace, fit: ShapeFit, target: Surface, side: str) -> float:
+    """0..1, the share of an ear by which the scan lies, of a ``fit`` to all of it but that ear."""
+    reach = NEAR_EAR * fit.pose.scale
+    return float(target.closest(fit.points[_ear(space, side)], reach).found.mean())
+
+
+def _ear(space, side):
+    return (space.ear > EAR) & ((space.points[:, 0] > 0) == (side == "l"))
 
 
 def under_hair(space: ShapeSpace, fit: ShapeFit, target: Surface) -> np.ndarray:
     """(n,) bool: the points of the skin over which the scan ``target`` shows hair."""
     size = fit.pose.scale
-    away = cKDTree(space.points[space.ear > 0.3]).query(space.points)[0] > FROM_EAR
+    away = cKDTree(space.points[space.ear > EAR]).query(space.points)[0] > FROM_EAR
     bare = forehead(space)
     covered = np.zeros(len(fit.points), dtype=bool)
     coarse = target.coarser()
