@@ -2,9 +2,9 @@
 """Hair of the head: a scanner sees it as a rough surface off the scalp, and it is no skin.
 
 Where hair can grow, hair is what is rougher than skin, and than the same scan's forehead: its normals vary against those of
-a plausible head laid on the scan (`shape_fit`). So is what stands off that head as far as no skull does. If hair hides an ear,
-it hides what lies about that ear as well, outside of the face. Laid on the scan again, in the knowledge of what is hair, that
-head tells where the scalp probably lies below.
+a plausible head laid on the scan (`shape_fit`), and its height does by more than noise. So is what stands off that head as
+far as no skull does. If hair hides an ear, it hides what lies about that ear as well, outside of the face. Laid on the scan
+again, in the knowledge of what is hair, that head tells where the scalp probably lies below.
 """
 
 from collections.abc import Collection
@@ -29,6 +29,9 @@ EAR = 0.3  # of `ShapeSpace.ear` from which on skin is an ear
 FROM_EAR = 12.0  # mm: nearer than this to an ear its folds are rough
 #: rad by which normals vary, and that in terms of the forehead's.
 ROUGH, ROUGHER = 0.14, 1.5
+UNEVEN = (
+    0.5  # mm by which heights vary at least: .26 where dark skin was scanned with noise, 1 to 2 over hair (medians)
+)
 HIGH = 8.0  # mm by which no skull stands off the head laid on it
 SMOOTH = 25  # per cent of a forehead that are smoother than skin is: hair falls on the rest of some
 LEAST = 0.15  # share of all hairy skin: fewer specks are no hair
@@ -130,7 +133,10 @@ def under_hair(space: ShapeSpace, fit: ShapeFit, target: Surface) -> np.ndarray:
     at = np.flatnonzero(space.hairy)
     link = within(fit.points[at], fit.points[near[look]], MOSTLY * size)
     count = np.maximum(np.asarray(link.sum(axis=1)).ravel(), 1)
-    hair = (rough > max(ROUGH, ROUGHER * usual)) | (high[look] > HIGH * size)
+    rough = (rough > max(ROUGH, ROUGHER * usual)) & (
+        varied(middle[look], high[look, None], AROUND * size) > UNEVEN * size
+    )
+    hair = rough | (high[look] > HIGH * size)
     covered[at] = link @ hair / count > 0.5
     if space.area[covered].sum() < LEAST * space.area[space.hairy].sum():
         covered[:] = False
@@ -188,7 +194,7 @@ def within(points, others, radius: float) -> csr_matrix:
 
 
 def varied(points, off, radius: float) -> np.ndarray:
-    """(k,) rad by which the differences ``off`` (k, 3) of normals vary about each of ``points`` (k, 3)."""
+    """(k,) by which values ``off`` (k, d), how normals differ for one, vary about each of ``points`` (k, 3)."""
     link = within(points, points, radius)
     count = np.maximum(np.asarray(link.sum(axis=1)).ravel(), 1)
     mean, square = link @ off / count[:, None], link @ (off**2).sum(axis=1) / count
