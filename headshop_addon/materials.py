@@ -48,8 +48,7 @@ def dressing(skin: bpy.types.Object) -> Work:
         if part == "skin":
             yield Progress(0.1, "Painting the skin")
             paint_skin(obj, mesh, head.groups, place, {n: axes @ p for n, p in head.landmark_positions().items()})
-            hidden = bridge.read_attribute(skin.data, "hidden")
-            unseen = head.groups["inner"] if hidden is None else unseen_skin(mesh, head.groups["inner"], hidden)
+            unseen = unseen_skin(mesh, head.groups["inner"], bridge.read_attribute(skin.data, "hidden"))
             own = yield from portion(_own_skin(skin, mesh, scan, unseen), 0.2, 0.85)
             yield Progress(0.85, "Dressing the head")
         elif part in ("eye_l", "eye_r"):

@@ -88,9 +88,11 @@ def iris_colour(scan: Mesh, eyes) -> np.ndarray | None:
     return found * np.clip(found @ LUMINANCE, 0.03, 0.16) / max(found @ LUMINANCE, 1e-4)
 
 
-def unseen_skin(skin: Mesh, inner: np.ndarray, hidden: np.ndarray) -> np.ndarray:
+def unseen_skin(skin: Mesh, inner: np.ndarray, hidden: np.ndarray | None) -> np.ndarray:
     """(n,) 0..1, skin whose colour no scan tells: what is ``inner`` (n,) 0..1, what is ``hidden`` (n,) bool, under hair for
-    one, and what is next to that, for there the scan shows the hair."""
+    one (None: nothing is), and what is next to that, for there the scan shows the hair."""
+    if hidden is None:
+        return inner
     beside = adjacency(skin) @ hidden.astype(float) > 0
     return np.where(hidden | beside, 1.0, inner)
 

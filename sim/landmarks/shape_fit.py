@@ -153,13 +153,10 @@ def fit_shape(
         height = np.einsum("ij,ij->i", gap, across)
         weight = every * trust[use] * area[use] / (1 + (height / width) ** 2) ** 2 / noise**2
         # What stands off hairy skin is hair of some depth, whatever the round.
-        deep = space.hairy[use] & (height > BALD)
-        weight[deep] = every * (trust * area)[use][deep] / DEEP[1] ** 2
-        gap[deep] -= DEEP[0] * across[deep]
-        if hair is not None:
-            deep = hair[use]
-            weight[deep] = every * (trust * area)[use][deep] / SEEN_DEEP[1] ** 2
-            gap[deep] = place[deep] - shaped[use][deep] - SEEN_DEEP[0] * across[deep]
+        seen = np.zeros(len(use), dtype=bool) if hair is None else hair[use]
+        for some, (depth, deviation) in ((hairy[use] & ~seen & (height > BALD), DEEP), (seen, SEEN_DEEP)):
+            weight[some] = every * (trust * area)[use][some] / deviation**2
+            gap[some] -= depth * across[some]
         # Unknowns: a small turn about the face, a shift, a change of size, and the coefficients.
         rows = np.concatenate([_rigid(shaped[use] - middle), space.modes[use]], axis=2)
         right = gap + space.modes[use] @ coefficients

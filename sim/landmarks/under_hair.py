@@ -29,9 +29,8 @@ EAR = 0.3  # of `ShapeSpace.ear` from which on skin is an ear
 FROM_EAR = 12.0  # mm: nearer than this to an ear its folds are rough
 #: rad by which normals vary, and that in terms of the forehead's.
 ROUGH, ROUGHER = 0.14, 1.5
-UNEVEN = (
-    0.5  # mm by which heights vary at least: .26 where dark skin was scanned with noise, 1 to 2 over hair (medians)
-)
+#: mm by which heights vary at least: .26 where dark skin was scanned with noise, 1 to 2 over hair (medians).
+UNEVEN = 0.5
 HIGH = 8.0  # mm by which no skull stands off the head laid on it
 SMOOTH = 25  # per cent of a forehead that are smoother than skin is: hair falls on the rest of some
 LEAST = 0.15  # share of all hairy skin: fewer specks are no hair
@@ -128,14 +127,12 @@ def under_hair(space: ShapeSpace, fit: ShapeFit, target: Surface) -> np.ndarray:
     look, plain = (space.hairy & away)[near], bare[near]
     if not look.any():
         return covered
-    rough = varied(middle[look], off[look], AROUND * size)
     usual = np.percentile(varied(middle[plain], off[plain], AROUND * size), SMOOTH) if plain.any() else 0.0
     at = np.flatnonzero(space.hairy)
     link = within(fit.points[at], fit.points[near[look]], MOSTLY * size)
     count = np.maximum(np.asarray(link.sum(axis=1)).ravel(), 1)
-    rough = (rough > max(ROUGH, ROUGHER * usual)) & (
-        varied(middle[look], high[look, None], AROUND * size) > UNEVEN * size
-    )
+    rough = varied(middle[look], off[look], AROUND * size) > max(ROUGH, ROUGHER * usual)
+    rough &= varied(middle[look], high[look, None], AROUND * size) > UNEVEN * size
     hair = rough | (high[look] > HIGH * size)
     covered[at] = link @ hair / count > 0.5
     if space.area[covered].sum() < LEAST * space.area[space.hairy].sum():
