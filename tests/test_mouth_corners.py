@@ -86,6 +86,16 @@ def test_a_hole_in_few_columns_is_no_mouth():
     assert mouth_outline(Surface(face.vertices, face.triangles[~hole]), _guess(), FORWARD) is None
 
 
+def test_a_hole_under_the_lower_lip_in_few_columns_is_no_mouth_either():
+    face = _face()
+    x, _, z = face.vertices[face.triangles].mean(axis=1).T
+    hole = (np.abs(x - 1) < 2) & (np.abs(z + 18) < 3)
+    found, whole = (mouth_outline(f, _guess(), FORWARD) for f in (Surface(face.vertices, face.triangles[~hole]), face))
+    assert found.lower[2] == pytest.approx(whole.lower[2], abs=1.0)
+    for name, place in whole.corners.items():
+        assert found.corners[name] == pytest.approx(place, abs=0.1)
+
+
 def test_the_lower_lip_between_a_crease_and_a_hole_under_it_is_no_tooth():
     upper, crease, hole = np.linspace(0, 3, 10), np.full(6, np.nan), np.full(10, np.nan)
     lip, teeth, chin = 5 + np.linspace(-1, 1, 20) ** 2, np.full(20, 12.0), np.full(20, 16.0)

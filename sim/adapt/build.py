@@ -44,7 +44,8 @@ class BuildResult:
     anatomy : muscles (count), skull_penetrations (bone vertices outside the skin), tissue_thickness_mm
     landmarks_missing : names of landmarks that were not given
     attributes : per skin vertex (n,) float32: ``fitted`` 0..1 (0: invented by the warp), ``distance_mm`` to the scan
-        (positive outside, NaN where there is no data); and (n,) bool ``hidden``, under hair or behind what the lips hold
+        (positive outside, NaN where there is no data); and (n,) bool ``hidden``: scalp without data, and skin under hair or
+        behind what the lips hold
     detail : displacement and normal map of what is finer than the mesh; None if not asked for
     scanned : (n, 3) mm, the head's skin with the expression that it was scanned with; None where it was not relaxed
     """
@@ -94,7 +95,7 @@ def build_head(
     yield Progress(0.08, "Judging the landmarks")
     check_on_surface(given, target)
     look = yield from portion(first_look(reference, target, given, leave_out == "never"), 0.1, 0.3)
-    fit = yield from portion(fit_skin(reference, look.filled, look.landmarks, look.lips, found, look.skull), 0.3, 0.6)
+    fit = yield from portion(fit_skin(reference, look.filled, look.landmarks, look.lips, found, look.guessed), 0.3, 0.6)
     fit = look.seen_only(fit)
     yield Progress(0.6, "Judging the fit")
     refuse_poor(fit_report(reference, fit, given))

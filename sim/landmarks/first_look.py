@@ -16,7 +16,7 @@ from ..progress import Work
 from ..relax.mouth_gap import MARKS
 from .expression import fit_expression
 from .held_by_lips import held_by_lips
-from .hidden_skin import hidden_skin, with_hidden_skin
+from .hidden_skin import hidden_skin, unseen_scalp, with_hidden_skin
 from .lids_told import lids_told
 from .placed_face import run
 from .pose_search import Pose
@@ -25,7 +25,8 @@ from .shape_space import shape_space
 from .under_hair import EAR, fit_under_hair, hair_over, in_face
 
 LOOKING = "Looking at lids and lips"
-SKULL = ("v", "op")
+#: Landmarks about which skin is much the same, so that a plausible head does not tell where they are.
+UNTOLD = ("tr", "eu")
 BESIDE_FACE = 11.0  # mm from the face's outline: what lies within and may be skin is as scanned
 FEWEST = 4  # landmarks that tell where the head is
 
@@ -34,8 +35,8 @@ FEWEST = 4  # landmarks that tell where the head is
 class FirstLook:
     """landmarks : name -> (3,) mm, those given and those of lids that are seen; lips : about where their landmarks are if
     they are parted, if only a little, or None; target : the scan without what the lips hold and hair; left_out : how much of
-    it that is, mm²; filled : with skin behind it, as it probably is; hidden (k,) : vertices of the reference's skin that make
-    that up; skull : name -> (3,) mm, about where landmarks of the skull are that were not given."""
+    it that is, mm²; filled : with skin behind it, and where it lacks the scalp, as that probably is; hidden (k,) : vertices of
+    the reference's skin that make that up; guessed : name -> (3,) mm, about where others are."""
 
     landmarks: dict[str, np.ndarray]
     target: Surface
@@ -43,7 +44,7 @@ class FirstLook:
     lips: dict[str, np.ndarray] | None = None
     left_out: dict[str, float] = field(default_factory=lambda: {"held_by_lips": 0.0, "hair": 0.0})
     hidden: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
-    skull: dict[str, np.ndarray] = field(default_factory=dict)
+    guessed: dict[str, np.ndarray] = field(default_factory=dict)
 
     def seen_only(self, fit: SkinFit) -> SkinFit:
         """A ``fit`` to the ``filled`` scan, as one to what the scan shows."""
@@ -75,17 +76,21 @@ def first_look(reference: Head, target: Surface, given: dict[str, np.ndarray], k
     landmarks = given | lids_told(space, fit, shown, coarse, given)
     laid = space.landmarks(fit.points)
     lips = {name: laid[name] for name in MARKS} if shown.parted else None
+    untold = (*UNTOLD, "sto") if shown.parted else UNTOLD
     laid = space.landmarks(hair.fit.points)
-    skull = {name: laid[name] for name in SKULL if name in laid and name not in given}
-    if keep_held:
-        return FirstLook(landmarks, target, target, lips, skull=skull)
-    held = held_by_lips(space, fit, target)
-    covered = hair.covered & ~in_face(space, hair.fit, given, BESIDE_FACE)
-    covered |= hair.far & ~in_face(space, hair.fit, given, 0.0)
+    guessed = {n: p for n, p in laid.items() if n not in landmarks and n.partition("_")[0] not in untold}
+    if keep_held and hair.covered.any():  # what lies far below hair is not unseen
+        return FirstLook(landmarks, target, target, lips, guessed=guessed)
+    held, covered = (np.zeros(len(each), dtype=bool) for each in (target.triangles, space.points))
+    if not keep_held:
+        held = held_by_lips(space, fit, target)
+        covered |= hair.covered & ~in_face(space, hair.fit, given, BESIDE_FACE)
+        covered |= hair.far & ~in_face(space, hair.fit, given, 0.0)
     shows = hair_over(space, hair.fit, target, covered)
     left = target.without(held | shows)
     hidden = hidden_skin(space, fit, target.vertices[target.triangles[held].ravel()], left)
     filled = with_hidden_skin(space, fit, hidden, left)
+    covered |= unseen_scalp(space, hair.fit, left)
     filled = with_hidden_skin(space, hair.fit, covered & (space.ear < EAR), filled)  # ears take the reference's shape
     out = {"held_by_lips": float(target.area[held].sum()), "hair": float(target.area[shows].sum())}
-    return FirstLook(landmarks, left, filled, lips, out, space.vertices[hidden | covered], skull)
+    return FirstLook(landmarks, left, filled, lips, out, space.vertices[hidden | covered], guessed)

@@ -16,6 +16,7 @@ from .shape_fit import ShapeFit, pairs
 from .shape_space import ShapeSpace
 
 BEHIND, SEEN = 9.0, 3.0  # mm to which a thing hides skin behind it; from which on skin is not seen
+NO_DATA = 12.0  # mm from unseen scalp to the scan, at least
 ABOUT = 30.0  # mm from hidden skin that is looked at
 TRUSTED = 0.3  # of `ShapeFit.trust`
 SPREAD, RANGE, ROUGH = 2.0, 9.0, 0.5  # mm: deviation of the heights, how far they go together, deviation of each
@@ -30,6 +31,14 @@ def hidden_skin(space: ShapeSpace, fit: ShapeFit, things, left: Surface) -> np.n
         return np.zeros(len(fit.points), dtype=bool)
     _, trust, _ = pairs(space, fit.points, left, SEEN * fit.pose.scale)
     return (trust == 0) & (cKDTree(things).query(fit.points)[0] < BEHIND * fit.pose.scale)
+
+
+def unseen_scalp(space: ShapeSpace, fit: ShapeFit, target: Surface) -> np.ndarray:
+    """(n,) bool: the points of the scalp and nape near which the scan ``target`` has nothing."""
+    hairy = np.flatnonzero(space.hairy)
+    out = np.zeros(len(fit.points), dtype=bool)
+    out[hairy] = ~target.closest(fit.points[hairy], NO_DATA * fit.pose.scale).found
+    return out
 
 
 def with_hidden_skin(space: ShapeSpace, fit: ShapeFit, hidden, left: Surface) -> Surface:

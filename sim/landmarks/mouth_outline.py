@@ -16,7 +16,7 @@ from ..relax.smile import CORNERS
 
 ASIDE, DOWN = 1.0, 0.5  # mm from column to column, and from place to place in one
 WIDE, ABOVE = 46.0, 12.0  # mm to either side of the middle, and above the upper lip, that are looked at
-MIDDLE = np.array([0.0, 2.0, -2.0, 4.0, -4.0])  # mm: columns in one of which the gap is looked for first
+MIDDLE = np.array([0.0, 2.0, -2.0, 4.0, -4.0])  # mm: columns in which the gap is looked for first
 BEHIND = 1.5  # mm: what lies deeper than this behind the line from lip to lip is within the mouth
 DRIFT = 1.5  # mm that an edge of the gap may rise or fall from one column to the next
 BESIDE = 2.0  # mm above and below the gap within which the lips are looked for
@@ -88,7 +88,8 @@ def mouth_arch(marks, middle: str, forward, aside):
 
 def middle_gap(depth):
     """Column, last place of the upper and first place of the lower lip, where a gap is seen in the middle; None: nowhere, or in
-    few columns, as a hole in the scan would be.
+    few columns, as a hole in the scan would be. Of several columns the one that has the lower lip in the middle of where they
+    have it: a hole below that lip makes the gap too wide in a few.
 
     depth (c, r) mm, see `looked_at`
     """
@@ -97,7 +98,10 @@ def middle_gap(depth):
         lips = widest_gap(depth[column, top:])
         if lips is not None:
             found.append((column, top + lips[0], top + lips[1]))
-    return found[0] if len(found) > len(MIDDLE) / 2 else None
+    if len(found) <= len(MIDDLE) / 2:
+        return None
+    lower = [start[2] for start in found]
+    return found[int(np.argmin(np.abs(lower - np.percentile(lower, 50, method="lower"))))]
 
 
 def widest_gap(line):

@@ -122,7 +122,7 @@ def fit_shape(
 
     coefficients (k,) : to begin with, of the first k modes; every : look at each so many-th point of the skin only;
     expression : what lips and lids are taken to do; told : what is known besides (None: nothing); hair (n,) bool : points
-    that are known to lie under hair
+    that are known to lie under hair; where it is known that none does, the scalp counts as any skin
 
     Raises
     ------
@@ -135,7 +135,8 @@ def fit_shape(
     usual = sum((space.shut[side] for side in expression.shut), np.zeros(m))
     usual += expression.parted * space.parted
     looking = np.arange(len(space.points))[::every]
-    hairy = space.hairy if hair is None else space.hairy | hair
+    hairy = space.hairy if hair is None or hair.any() else np.zeros_like(space.hairy)
+    hairy = hairy if hair is None else hairy | hair
     area = space.area / PATCH * np.where(hairy, HAIR, 1.0)
     for done, (variance, reach, width, noise) in enumerate(rounds):
         shaped = space.shaped(coefficients)

@@ -55,13 +55,14 @@ class UnderHair:
 
 
 def fit_under_hair(space: ShapeSpace, target: Surface, fit: ShapeFit, shown: Expression, given: Collection[str] = ()):
-    """A generator: yields the fraction done, returns `UnderHair`, with ``fit`` itself where the scan ``target`` shows no hair.
+    """A generator: yields the fraction done, returns `UnderHair` of a ``fit`` to the scan ``target``.
 
     shown : the expression of ``fit``; given : names of landmarks that are known: an ear that has any is no hair
     """
     covered = under_hair(space, fit, target)
     if not covered.any():
-        return UnderHair(fit, covered, covered)
+        work = fit_shape(space, target, fit.pose, CHANGE, fit.coefficients, 1, shown, hair=covered)
+        return UnderHair((yield from work), covered, covered)
     bare = np.flatnonzero(in_face(space, fit, {}, INNER))
     held = Told(np.repeat(bare[:, None], 3, axis=1), np.full((len(bare), 3), 1 / 3), fit.points[bare])
     outside = ~in_face(space, fit, {}, EDGE)

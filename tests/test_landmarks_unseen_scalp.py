@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Scalp that a scan does not show is laid where the likeliest head to go with its face has it; scalp that it shows counts."""
+
+import numpy as np
+import pytest
+
+from headshop.sim.adapt.build import build_head
+from headshop.sim.adapt.closest import Surface
+from headshop.sim.adapt.thin_plate_spline import similarity
+from headshop.sim.anatomy.landmark_names import SKIN
+from headshop.sim.landmarks.first_look import first_look
+from headshop.sim.landmarks.pose_search import Pose
+from headshop.sim.landmarks.shape_fit import REST, fit_shape
+from headshop.sim.landmarks.shape_space import shape_space
+from headshop.sim.landmarks.under_hair import fit_under_hair
+from headshop.sim.mesh import Mesh
+from headshop.sim.mesh_subdivision import drawn
+from headshop.sim.progress import finish
+
+SKULL = ("v", "op", "eu", "tr")
+BEHIND = 20.0  # mm behind the ears to which the scan goes
+
+
+@pytest.fixture(scope="module")
+def space(reference):
+    return shape_space(reference)
+
+
+@pytest.fixture(scope="module")
+def person(space):
+    """Somebody of the shape space, lips closed and eyes open: the skin (n, 3) mm and its landmarks."""
+    k = np.arange(space.modes.shape[2])
+    skin = space.shaped(np.where(k < 12, 0.8 * (-1.0) ** k, 0.0))
+    return skin, {n: p for n, p in space.landmarks(skin).items() if n in SKIN}
+
+
+@pytest.fixture(scope="module")
+def mask(space, person):
+    """A scan of the face of that person, up to the hair: (Mesh, (n,) bool: what it shows)."""
+    skin, marks = person
+    seen = (skin[:, 2] < marks["tr"][2]) & (skin[:, 1] < marks["t_l"][1] + BEHIND)
+    return Mesh.from_triangles(skin, space.triangles[seen[space.triangles].all(axis=1)]), seen
+
+
+def test_the_likeliest_head_has_the_crown_of_measured_heads(space, reference):
+    """From nasion to vertex it has .9 of what it has from nasion to gnathion; all that lies below nasion is the reference's."""
+    marks = space.landmarks(space.points)
+    assert (marks["v"][2] - marks["n"][2]) / (marks["n"][2] - marks["gn"][2]) == pytest.approx(0.91, abs=0.03)
+    rest = drawn(reference.skin.faces, reference.skin.vertices)[space.vertices]
+    low = rest[:, 2] < reference.landmark_positions()["n"][2]
+    assert np.array_equal(space.points[low], rest[low])
+
+
+def test_scalp_without_data_is_the_likeliest_heads(space, person, mask, reference):
+    """Nearer to the person's own than the reference's is, though nothing of it is seen."""
+    skin, marks = person
+    scan, seen = mask
+    target = Surface(scan.vertices, scan.triangles)
+    given = {n: p for n, p in marks.items() if n.partition("_")[0] not in SKULL}
+    look = finish(first_look(reference, target, given))
+    assert look.target is target and look.left_out == {"held_by_lips": 0.0, "hair": 0.0}
+    scalp = space.hairy & ~seen & (skin[:, 2] > marks["tr"][2] + 20)
+    assert not target.closest(skin[scalp], 15.0).found.any()
+    off = look.filled.closest(skin[scalp]).distance
+    names = list(given)
+    rest = reference.landmark_positions()
+    matrix, shift = similarity([rest[n] for n in names], [given[n] for n in names])
+    plain = Surface(reference.skin.vertices @ matrix.T + shift, reference.skin.triangles).closest(skin[scalp]).distance
+    assert off.mean() < 5.0 and off.mean() < 0.6 * plain.mean()
+    assert np.isin(np.flatnonzero(scalp), np.flatnonzero(np.isin(space.vertices, look.hidden))).mean() > 0.95
+
+
+def test_a_head_built_of_a_mask_says_its_scalp_is_invented(space, person, mask, reference):
+    skin, marks = person
+    scan, seen = mask
+    built = finish(build_head(reference, scan, {n: p for n, p in marks.items() if n not in ("v", "op")}, detail=0))
+    scalp = space.hairy & (skin[:, 2] > marks["tr"][2] + 20)
+    rows = space.vertices[scalp]
+    assert built.attributes["fitted"][rows].max() == 0 and np.isnan(built.attributes["distance_mm"][rows]).all()
+    assert "scalp" in built.fit["invented"] and built.fit["left_out_mm2"]["hair"] == 0
+    off = np.linalg.norm(built.head.skin.vertices[rows] - skin[scalp], axis=1)
+    assert built.head.skin.vertices[rows][:, 2].max() == pytest.approx(skin[:, 2].max(), abs=6.0)
+    assert np.mean(off) < 12.0
+
+
+def test_a_scalp_that_is_seen_bare_counts_as_skin(space, person):
+    """Before it is known to be, it is mistrusted: what stands off it could be hair."""
+    skin, _ = person
+    target = Surface(skin, space.triangles)
+    first = finish(fit_shape(space, target, Pose(1.0, np.eye(3), np.zeros(3), 0.0)))
+    second = finish(fit_under_hair(space, target, first, REST))
+    assert not second.covered.any()
+    high = space.hairy & (skin[:, 2] > np.median(skin[space.hairy, 2]))
+    before, after = (np.linalg.norm(fit.points - skin, axis=1)[high].mean() for fit in (first, second.fit))
+    assert after < 0.9 * before
