@@ -14,7 +14,7 @@ from .lip_line import LipLine, lip_line
 from .mouth_outline import MouthOutline, mouth_outline
 from .open_lids import open_lids, told_of_open_lids
 from .picked import moved
-from .shape_fit import CHANGE, REST, Expression, ShapeFit, Told, fit_shape
+from .shape_fit import CHANGE, REST, Expression, ShapeFit, Told, fit_shape, part_of
 from .shape_space import ShapeSpace
 
 AROUND_EYE = 22.0  # mm
@@ -45,12 +45,12 @@ def fit_expression(space: ShapeSpace, target: Surface, fit: ShapeFit):
 def _fit_lips(space, target, fit):
     """As `fit_expression`; returns the `ShapeFit`, whether its lips are parted, and what is `Told` of them."""
     opened = fit.coefficients + space.parted
-    free = yield from _third(fit_shape(space, target, fit.pose, CHANGE, opened, 1, Expression(True)), 0)
+    free = yield from part_of(fit_shape(space, target, fit.pose, CHANGE, opened, 1, Expression(True)), 0, 3)
     outline = outline_of(space, free, target)
     told = None if outline is None else told_of_mouth(space, outline)
     if told is not None:
         work = fit_shape(space, target, free.pose, CHANGE, free.coefficients, 1, Expression(True), told)
-        free = yield from _third(work, 1)
+        free = yield from part_of(work, 1, 3)
     gap = told is not None or lips_ajar(space, free, target)
     mouth = about_mouth(space)
     parted = gap and cost(space, free, mouth) < NO_WORSE * cost(space, fit, mouth)
@@ -60,7 +60,7 @@ def _fit_lips(space, target, fit):
     if line is None:
         return fit, False, None
     told = told_of_lips(space, fit, line)
-    fit = yield from _third(fit_shape(space, target, fit.pose, CHANGE, fit.coefficients, 1, REST, told), 1)
+    fit = yield from part_of(fit_shape(space, target, fit.pose, CHANGE, fit.coefficients, 1, REST, told), 1, 3)
     return fit, False, told
 
 
@@ -69,7 +69,7 @@ def _fit_lids(space, target, fit, parted, told):
 
     def changed(expression, start, more=None):
         every = more if told is None else told.and_of(more)
-        return _third(fit_shape(space, target, fit.pose, CHANGE, start, 1, expression, every), 2)
+        return part_of(fit_shape(space, target, fit.pose, CHANGE, start, 1, expression, every), 2, 3)
 
     laid = space.landmarks(fit.points), fit.matrix, target
     gaps = gaps_in_eyes(*laid)
@@ -134,15 +134,6 @@ def told_of_mouth(space: ShapeSpace, outline: MouthOutline) -> Told:
     corners, weights = np.repeat(edges[:, None], 3, axis=1), np.tile([1.0, 0.0, 0.0], (2, 1))
     lips = Told(corners, weights, np.array([outline.upper, outline.lower]))
     return Told.of(space, outline.corners).and_of(lips)
-
-
-def _third(work, before):
-    while True:
-        try:
-            done = next(work)
-        except StopIteration as end:
-            return end.value
-        yield (before + done) / 3
 
 
 def lips_ajar(space: ShapeSpace, free: ShapeFit, target: Surface) -> bool:

@@ -16,7 +16,7 @@ from ..progress import Work
 from ..relax.mouth_gap import MARKS
 from .expression import fit_expression
 from .held_by_lips import held_by_lips
-from .hidden_skin import hidden_skin, unseen_scalp, with_hidden_skin
+from .hidden_skin import SCALP, hidden_skin, unseen_scalp, with_hidden_skin
 from .lids_told import lids_told
 from .placed_face import run
 from .pose_search import Pose
@@ -27,6 +27,7 @@ from .under_hair import EAR, fit_under_hair, hair_over, in_face
 LOOKING = "Looking at lids and lips"
 #: Landmarks about which skin is much the same, so that a plausible head does not tell where they are.
 UNTOLD = ("tr", "eu")
+SKULL = ("v", "op")
 BESIDE_FACE = 11.0  # mm from the face's outline: what lies within and may be skin is as scanned
 FEWEST = 4  # landmarks that tell where the head is
 
@@ -77,7 +78,8 @@ def first_look(reference: Head, target: Surface, given: dict[str, np.ndarray], k
     laid = space.landmarks(fit.points)
     lips = {name: laid[name] for name in MARKS} if shown.parted else None
     untold = (*UNTOLD, "sto") if shown.parted else UNTOLD
-    laid = space.landmarks(hair.fit.points)
+    laid, skull = space.landmarks(hair.fit.points), space.landmarks(hair.scalp.points)
+    laid |= {name: skull[name] for name in SKULL if name in skull}
     guessed = {n: p for n, p in laid.items() if n not in landmarks and n.partition("_")[0] not in untold}
     if keep_held and hair.covered.any():  # what lies far below hair is not unseen
         return FirstLook(landmarks, target, target, lips, guessed=guessed)
@@ -90,7 +92,8 @@ def first_look(reference: Head, target: Surface, given: dict[str, np.ndarray], k
     left = target.without(held | shows)
     hidden = hidden_skin(space, fit, target.vertices[target.triangles[held].ravel()], left)
     filled = with_hidden_skin(space, fit, hidden, left)
-    covered |= unseen_scalp(space, hair.fit, left)
-    filled = with_hidden_skin(space, hair.fit, covered & (space.ear < EAR), filled)  # ears take the reference's shape
+    covered |= unseen_scalp(space, hair.scalp, left)
+    scalp = covered & (space.ear < EAR)  # ears take the reference's shape
+    filled = with_hidden_skin(space, hair.scalp, scalp, filled, SCALP)
     out = {"held_by_lips": float(target.area[held].sum()), "hair": float(target.area[shows].sum())}
     return FirstLook(landmarks, left, filled, lips, out, space.vertices[hidden | covered], guessed)

@@ -16,10 +16,11 @@ from .shape_fit import ShapeFit, pairs
 from .shape_space import ShapeSpace
 
 BEHIND, SEEN = 9.0, 3.0  # mm to which a thing hides skin behind it; from which on skin is not seen
-NO_DATA = 12.0  # mm from unseen scalp to the scan, at least
-ABOUT = 30.0  # mm from hidden skin that is looked at
+NO_DATA = 20.0  # mm from unseen scalp to the scan, at least
 TRUSTED = 0.3  # of `ShapeFit.trust`
-SPREAD, RANGE, ROUGH = 2.0, 9.0, 0.5  # mm: deviation of the heights, how far they go together, deviation of each
+#: mm, about the mouth and on the scalp: from hidden skin that is looked at, deviation of the heights, how far they go together.
+LIPS, SCALP = (30.0, 2.0, 9.0), (60.0, 4.0, 25.0)
+ROUGH = 0.5  # mm: deviation of each height
 ALIKE = 0.8  # correlation of left and right
 MIRROR = np.array([-1.0, 1.0, 1.0])
 
@@ -34,36 +35,40 @@ def hidden_skin(space: ShapeSpace, fit: ShapeFit, things, left: Surface) -> np.n
 
 
 def unseen_scalp(space: ShapeSpace, fit: ShapeFit, target: Surface) -> np.ndarray:
-    """(n,) bool: the points of the scalp and nape near which the scan ``target`` has nothing."""
-    hairy = np.flatnonzero(space.hairy)
+    """(n,) bool: the points of the scalp, above the ears' canals, near which the scan ``target`` has nothing."""
+    scalp = np.flatnonzero(space.hairy & (space.points[:, 2] > space.landmarks(space.points)["t_l"][2]))
     out = np.zeros(len(fit.points), dtype=bool)
-    out[hairy] = ~target.closest(fit.points[hairy], NO_DATA * fit.pose.scale).found
+    out[scalp] = ~target.closest(fit.points[scalp], NO_DATA * fit.pose.scale).found
     return out
 
 
-def with_hidden_skin(space: ShapeSpace, fit: ShapeFit, hidden, left: Surface) -> Surface:
-    """The scan ``left`` with the ``hidden`` (n,) bool skin in its place, where that probably is."""
+def with_hidden_skin(space: ShapeSpace, fit: ShapeFit, hidden, left: Surface, heights=LIPS) -> Surface:
+    """The scan ``left`` with the ``hidden`` (n,) bool skin in its place, where that probably is.
+
+    heights : `LIPS` or `SCALP`, how those of a scan vary there
+    """
+    about, spread, together = heights
     patch = space.triangles[hidden[space.triangles].any(axis=1)]
     if len(patch) == 0:
         return left
     used, corners = np.unique(patch, return_inverse=True)
     normals = vertex_normals(fit.points, space.triangles)
     place, trust, _ = pairs(space, fit.points, left, 2 * SEEN * fit.pose.scale)
-    near = cKDTree(space.points[used]).query(space.points * MIRROR)[0] < ABOUT
-    near |= cKDTree(space.points[used]).query(space.points)[0] < ABOUT
+    near = cKDTree(space.points[used]).query(space.points * MIRROR)[0] < about
+    near |= cKDTree(space.points[used]).query(space.points)[0] < about
     known = np.flatnonzero(near & (trust > TRUSTED))
     off = np.einsum("ij,ij->i", place[known] - fit.points[known], normals[known])
-    system = _alike(space.points[known], space.points[known])
-    system[np.diag_indices_from(system)] += (ROUGH / SPREAD) ** 2
-    out = _alike(space.points[used], space.points[known]) @ cho_solve(cho_factor(system), off)
+    system = _alike(space.points[known], space.points[known], together)
+    system[np.diag_indices_from(system)] += (ROUGH / spread) ** 2
+    out = _alike(space.points[used], space.points[known], together) @ cho_solve(cho_factor(system), off)
     points = fit.points[used] + out[:, None] * normals[used]
     return left.beside(points, corners.reshape(-1, 3))
 
 
-def _alike(a, b):
-    """(j, k) covariance between points (j, 3) and (k, 3) mm, as a share of the variance."""
+def _alike(a, b, together):
+    """(j, k) covariance between points (j, 3) and (k, 3) mm, as a share of the variance, that go ``together`` so far (mm)."""
 
     def near(c):
-        return np.exp(-cdist(a, c, "sqeuclidean") / (2 * RANGE**2))
+        return np.exp(-cdist(a, c, "sqeuclidean") / (2 * together**2))
 
     return near(b) + ALIKE * near(b * MIRROR)

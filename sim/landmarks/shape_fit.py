@@ -202,6 +202,16 @@ def fit_shape(
     return ShapeFit(points, coefficients, Pose(scale, turn, shift, pose.misfit), trust, distance, spread)
 
 
+def part_of(work, before: int, of: int):
+    """A generator: what ``work``, which yields the fraction done, is of a whole, of whose parts ``before`` ``of`` are done."""
+    while True:
+        try:
+            done = next(work)
+        except StopIteration as end:
+            return end.value
+        yield (before + done) / of
+
+
 def pairs(space: ShapeSpace, points, target: Surface, reach, looking=slice(None)):
     """Where on the scan the skin's ``points`` belong: place (n, 3), trust (n,) 0..1, the scan's normals there (n, 3).
 
