@@ -16,7 +16,7 @@ from ..progress import Work
 from ..relax.mouth_gap import MARKS
 from .expression import fit_expression
 from .held_by_lips import held_by_lips
-from .hidden_skin import SCALP, hidden_skin, unseen_scalp, with_hidden_skin
+from .hidden_skin import UNSEEN, hidden_skin, unseen_scalp, with_hidden_skin
 from .lids_told import lids_told
 from .placed_face import run
 from .pose_search import Pose
@@ -92,8 +92,9 @@ def first_look(reference: Head, target: Surface, given: dict[str, np.ndarray], k
     left = target.without(held | shows)
     hidden = hidden_skin(space, fit, target.vertices[target.triangles[held].ravel()], left)
     filled = with_hidden_skin(space, fit, hidden, left)
-    covered |= unseen_scalp(space, hair.scalp, left)
-    scalp = covered & (space.ear < EAR)  # ears take the reference's shape
-    filled = with_hidden_skin(space, hair.scalp, scalp, filled, SCALP)
+    no_ear = space.ear < EAR  # ears take the reference's shape
+    filled = with_hidden_skin(space, hair.fit, covered & no_ear, filled)
+    unseen = unseen_scalp(space, hair.scalp, left) & ~covered
+    filled = with_hidden_skin(space, hair.scalp, unseen & no_ear, filled, UNSEEN)
     out = {"held_by_lips": float(target.area[held].sum()), "hair": float(target.area[shows].sum())}
-    return FirstLook(landmarks, left, filled, lips, out, space.vertices[hidden | covered], guessed)
+    return FirstLook(landmarks, left, filled, lips, out, space.vertices[hidden | covered | unseen], guessed)

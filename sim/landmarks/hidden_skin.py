@@ -18,8 +18,9 @@ from .shape_space import ShapeSpace
 BEHIND, SEEN = 9.0, 3.0  # mm to which a thing hides skin behind it; from which on skin is not seen
 NO_DATA = 20.0  # mm from unseen scalp to the scan, at least
 TRUSTED = 0.3  # of `ShapeFit.trust`
-#: mm, about the mouth and on the scalp: from hidden skin that is looked at, deviation of the heights, how far they go together.
-LIPS, SCALP = (30.0, 2.0, 9.0), (60.0, 4.0, 25.0)
+#: mm, of skin behind something, and of skin that nothing shows: how far about it is looked, and of heights their deviation and
+#: how far they go together.
+COVERED, UNSEEN = (30.0, 2.0, 9.0), (60.0, 4.0, 25.0)
 ROUGH = 0.5  # mm: deviation of each height
 ALIKE = 0.8  # correlation of left and right
 MIRROR = np.array([-1.0, 1.0, 1.0])
@@ -42,10 +43,10 @@ def unseen_scalp(space: ShapeSpace, fit: ShapeFit, target: Surface) -> np.ndarra
     return out
 
 
-def with_hidden_skin(space: ShapeSpace, fit: ShapeFit, hidden, left: Surface, heights=LIPS) -> Surface:
+def with_hidden_skin(space: ShapeSpace, fit: ShapeFit, hidden, left: Surface, heights=COVERED) -> Surface:
     """The scan ``left`` with the ``hidden`` (n,) bool skin in its place, where that probably is.
 
-    heights : `LIPS` or `SCALP`, how those of a scan vary there
+    heights : `COVERED` or `UNSEEN`, how those of a scan vary there
     """
     about, spread, together = heights
     patch = space.triangles[hidden[space.triangles].any(axis=1)]

@@ -50,9 +50,9 @@ LOOSE = ((1.0, 8.0, 2.5, 4.5),) * 6
 
 @dataclass(frozen=True, eq=False)
 class UnderHair:
-    """fit : the `ShapeFit` of a head to a scan of which it is known what is hair; scalp : a looser one, that tells where the
-    scalp is that is not seen; covered (n,) bool : the points of its skin over which hair is; far (n,) bool : those from which
-    it stands off as no skin does."""
+    """fit : the `ShapeFit` of a head to a scan of which it is known what is hair; scalp : where there is none, a looser one,
+    that tells where scalp is that is not seen; covered (n,) bool : the points of its skin over which hair is; far (n,) bool :
+    those from which it stands off as no skin does."""
 
     fit: ShapeFit
     scalp: ShapeFit
@@ -84,13 +84,13 @@ def fit_under_hair(space: ShapeSpace, target: Surface, fit: ShapeFit, shown: Exp
     unsure = [side for side in "lr" if not any(f"{name}_{side}" in given for name in EAR_MARKS)]
     likeness = like_ears(space, fit, target)
     work, about = without(unsure)
-    guessed = yield from part_of(work, 0, 3)
+    guessed = yield from part_of(work, 0, 2)
     hidden = [
         side for side in unsure if likeness[side] < LIKE_AN_EAR or ear_found(space, guessed, target, side) < FOUND
     ]
     if hidden != unsure:
         work, about = without(hidden)
-        guessed = yield from part_of(work, 1, 3)
+        guessed = yield from part_of(work, 1, 2)
     fit = guessed
     _, near, _, high = over(fit, space, target)
     near, high = near[near >= 0], high[near >= 0] / fit.pose.scale
@@ -101,8 +101,7 @@ def fit_under_hair(space: ShapeSpace, target: Surface, fit: ShapeFit, shown: Exp
     covered |= off & (about | space.hairy)
     for side in hidden:
         covered |= _ear(space, side)
-    work = fit_shape(space, target, fit.pose, LOOSE, fit.coefficients, 1, shown, hair=covered)
-    return UnderHair(fit, (yield from part_of(work, 2, 3)), covered, covered & far)
+    return UnderHair(fit, fit, covered, covered & far)  # hair tells more of the scalp than a looser fit
 
 
 def about_ears(space: ShapeSpace, sides: Collection[str]) -> np.ndarray:
