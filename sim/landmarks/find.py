@@ -17,13 +17,11 @@ from .placed_face import place_face, run
 from .pose_search import LOOKING
 from .shape_space import shape_space
 from .sure import SURE
-from .under_hair import fit_under_hair, hair_over, in_face
+from .under_hair import SKULL, fit_under_hair, hair_over, in_face
 from .verdict import misfit_of
 
 #: Landmarks that the shape tells better than the range map.
 OWN = set("v op eu g n se ps pi ex ft ac sbal li ch sa sba pa obs".split())
-#: Those that a head tells which is laid on the scan loosely, where it has a hole.
-SKULL = ("v", "op", "eu")
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +76,7 @@ def find_landmarks(mesh: Mesh, reference: Head | None = None, unit_scales=(1.0,)
     fit = hair.fit
     positions = picked(space, fit, target)
     confidence, mid_air, missing = judge(space, fit, target, positions)
-    skull = space.landmarks(hair.scalp.points)
+    skull = picked(space, hair.scalp, target)
     positions |= {n: skull[n] for n in mid_air if n.partition("_")[0] in SKULL}
     positions = {n: p for n, p in positions.items() if n not in missing}
     confidence = {n: confidence[n] for n in positions}

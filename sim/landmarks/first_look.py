@@ -22,12 +22,11 @@ from .placed_face import run
 from .pose_search import Pose
 from .shape_fit import NoFaceError, fit_shape
 from .shape_space import shape_space
-from .under_hair import EAR, fit_under_hair, hair_over, in_face
+from .under_hair import EAR, SKULL, fit_under_hair, hair_over, in_face
 
 LOOKING = "Looking at lids and lips"
 #: Landmarks about which skin is much the same, so that a plausible head does not tell where they are.
 UNTOLD = ("tr", "eu")
-SKULL = ("v", "op")
 BESIDE_FACE = 11.0  # mm from the face's outline: what lies within and may be skin is as scanned
 FEWEST = 4  # landmarks that tell where the head is
 
@@ -79,7 +78,7 @@ def first_look(reference: Head, target: Surface, given: dict[str, np.ndarray], k
     lips = {name: laid[name] for name in MARKS} if shown.parted else None
     untold = (*UNTOLD, "sto") if shown.parted else UNTOLD
     laid, skull = space.landmarks(hair.fit.points), space.landmarks(hair.scalp.points)
-    laid |= {name: skull[name] for name in SKULL if name in skull}
+    laid |= {n: p for n, p in skull.items() if n.partition("_")[0] in SKULL}
     guessed = {n: p for n, p in laid.items() if n not in landmarks and n.partition("_")[0] not in untold}
     if keep_held and hair.covered.any():  # what lies far below hair is not unseen
         return FirstLook(landmarks, target, target, lips, guessed=guessed)

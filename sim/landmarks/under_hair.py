@@ -44,8 +44,11 @@ INNER = -20.0  # mm from that outline within which no hair led the fit astray
 OFF = 4.0  # mm by which hair stands off there
 #: Rounds of a fit that tells of the scalp, as in `shape_fit.SCHEDULE`. What a face has of its own to a millimetre tells nothing
 #: of the skull behind, and a fit that explains it bends that: given the faces of seven heads and a mannequin, such a fit was
-#: 13.7 mm off their skulls (95th percentile), this one is 7.4; given nine faces of ICT-FaceKit, 9.3 and 9.7.
+#: 14.1 mm off their skulls (95th percentile), this one is 7.4; given nine faces of ICT-FaceKit, 9.1 and 9.7.
 LOOSE = ((1.0, 8.0, 2.5, 4.5),) * 6
+
+#: Landmarks that such a fit tells where they are not seen.
+SKULL = ("v", "op", "eu")
 
 
 @dataclass(frozen=True, eq=False)
