@@ -8,12 +8,15 @@ from headshop.sim.acting.plain_posing import plainly_posed
 from headshop.sim.adapt import build
 from headshop.sim.adapt.closest import Surface
 from headshop.sim.anatomy.landmark_names import SKIN
+from headshop.sim.landmarks.find import find_landmarks
 from headshop.sim.landmarks.first_look import first_look
 from headshop.sim.mesh import Mesh
 from headshop.sim.mesh_subdivision import smoother
 from headshop.sim.progress import finish
 from headshop.sim.relax.mouth_gap import MARKS
 from headshop.sim.relax.parted import parted_lips
+from headshop.sim.scan.clean import clean_scan
+from headshop.sim.scan.ply import read_ply
 
 RADIUS, LONG = 4.0, 38.0  # mm of the tube
 ASIDE = 9.0  # mm from the middle of the mouth to the tube, to the subject's right
@@ -134,3 +137,12 @@ def test_parted_lips_are_told_where_their_landmarks_are_not_given(reference, mar
     found = parted_lips(reference, scan, given, look.lips)
     assert found is not None and np.linalg.norm(found.edges[0] - found.edges[1]) > 4
     assert finish(first_look(reference, Surface(*face, smooth=2.0), marks)).lips is None
+
+
+def test_lips_that_a_breathing_tube_holds_a_little_apart_are_closed(shared, reference):
+    """They are 3.8 mm apart there; lips that nothing shows to be apart would count as closed with that."""
+    scan = clean_scan(read_ply(shared / "ct_headsq" / "skin.ply"))[0]
+    sure = finish(find_landmarks(scan, reference)).sure()
+    fit = finish(build.build_head(reference, scan, sure, detail=0, found=set(sure))).fit
+    assert fit["left_out_mm2"]["held_by_lips"] > 500
+    assert fit["relaxed"] is not None and fit["relaxed"]["jaw_degrees"] > 2
