@@ -2,8 +2,8 @@
 """A head as plain files for programs that have no Blender: meshes as PLY, the rest as JSON, shapes as ``.npz``.
 
 All in mm, Z up, face toward -Y, in the scan's own place. ``skin.ply`` is the surface as Blender draws it, the cage
-subdivided once, with the front of the eyeballs between open lids. Shapes have the cage's own vertices, each where
-it comes to lie on that surface, the limit of subdivision; landmarks lie there too.
+subdivided once, with the front of the eyeballs between open lids and a film between open lips. Shapes have the cage's
+own vertices, each where it comes to lie on that surface, the limit of subdivision; landmarks lie there too.
 """
 
 import io
