@@ -11,7 +11,7 @@ import numpy as np
 
 from ...sim.acting.pose import Pose, control
 from ...sim.anatomy.storage import REFERENCE, load_head, write_atomically
-from ...sim.relax.bunching import borne, swelling
+from ...sim.relax.bunching import fleshed
 from ...sim.relax.responses import MUSCLES, OPENINGS, TABLE, UNPAIRED, mirrored_vertices
 from ...sim.tissue.model import build_model
 from ...sim.tissue.solver import rest_state, solve
@@ -29,7 +29,7 @@ def main(argv: list[str]) -> int:
 
     def moved(pose):
         field = solve(model, control(model, pose), max_iterations=ITERATIONS).state.skin - rest
-        field = borne(head, field) + swelling(head, field)
+        field = fleshed(head, field, pose.jaw_open)
         field[np.linalg.norm(field, axis=1) < STILL] = 0
         return field
 

@@ -11,11 +11,21 @@ from scipy.sparse import identity
 from ..adapt.smooth_system import laplacian
 from ..anatomy.head import Head
 from ..mesh import vertex_normals
+from .jaw_floor import held_up, pushed_out
 
 #: Thickness of the flesh, mm: our own estimate for the middle of the cheek, of which the table of tissue depths has no row.
 FLESH = 14.0
 ROUNDS = 30  # smoothing steps: flesh spreads what presses it over about its own thickness
 LEAVES = ("inner", "lip_upper", "lip_lower", "nose", "neck", "scalp", "forehead")
+
+
+def fleshed(head: Head, displacement, opening: float = 0.0) -> np.ndarray:
+    """The displacement (n, 3) mm of the simulated skin with what the flesh under it adds and what it does not let happen.
+
+    opening : the jaw's, 0..1, that is part of the displacement
+    """
+    displacement = borne(head, displacement) + swelling(head, displacement)
+    return held_up(head, displacement) if opening == 0 else pushed_out(head, displacement, opening)
 
 
 def borne(head: Head, displacement) -> np.ndarray:

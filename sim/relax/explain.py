@@ -24,6 +24,8 @@ from .responses import Responses
 from .unlike import unlike
 
 OPEN = 1.0  # opening of the jaw that shrinkage expects
+#: How far a smiling jaw opens otherwise than by its share in joy: teeth of people who smile are apart by some millimetres.
+PART = 0.07
 SMILE = 2.0  # strength of a smile, by the joy of the table of expressions, that it expects
 ALONE = 0.5  # contraction of a muscle beyond its share in the smile
 UNEVEN = 0.15  # difference between the sides
@@ -44,11 +46,12 @@ class Expression:
 @dataclass(frozen=True, eq=False)
 class Told:
     """rows (k, n) sparse, moves (k, 3) mm and deviations (k, 3) mm: how far an expression is known to move points of the
-    skin that the rows give."""
+    skin that the rows give; smiles : whether it is a smile, whose jaw opens with it."""
 
     rows: csr_matrix
     moves: np.ndarray
     deviations: np.ndarray
+    smiles: bool = False
 
 
 def explain(
@@ -82,7 +85,7 @@ def explain(
         y, noise = np.append(y, told.moves), np.append(noise, told.deviations)
         people = np.pad(people, (0, told.moves.size))
     sampled = np.stack([(rows @ field).ravel() for field in fields], axis=1)
-    shrink = shrinkage([table.names[k] for k in pick])
+    shrink = shrinkage([table.names[k] for k in pick], told is not None and told.smiles)
     opening, contraction = 0.2, np.full(len(pick), 0.3)
     for _ in range(ROUNDS):
         others = unlike(table, fields, vertices, jaw, opening, contraction)
@@ -101,13 +104,19 @@ def explain(
     return Expression(opening, muscles, modelled + beyond, modelled)
 
 
-def shrinkage(names) -> np.ndarray:
+def shrinkage(names, smiles: bool = False) -> np.ndarray:
     """Rows (r, k + 2) that cost nothing where jaw and muscles do what faces usually do: little, both sides alike, and
-    those of a smile together. Columns: the jaw, the muscles ``names``, the smile's strength."""
+    those of a smile together. Columns: the jaw, the muscles ``names``, the smile's strength.
+
+    smiles : whether the face is known to smile, so that the jaw opens with the smile and little else
+    """
     count = len(names)
-    joy = expressions()["joy"].muscles
+    pose = expressions()["joy"]
+    joy = pose.muscles
     rows = [np.zeros(count + 2), np.zeros(count + 2)]
     rows[0][0], rows[1][-1] = 1 / OPEN, 1 / SMILE
+    if smiles:
+        rows[0][0], rows[0][-1] = 1 / PART, -pose.jaw_open / PART
     for k, name in enumerate(names):
         row = np.zeros(count + 2)
         row[k + 1], row[-1] = 1 / ALONE, -joy.get(name, 0.0) / ALONE

@@ -11,7 +11,7 @@ from scipy.spatial.distance import cdist
 from ..scan.individual import variation
 
 #: Differences beyond the norms: reach in mm, deviation in mm along each axis.
-BEYOND = ((45.0, 1.6), (18.0, 1.2))
+BEYOND = ((45.0, 3.0), (18.0, 2.0))
 
 
 def covariance(landmarks, points, still) -> np.ndarray:

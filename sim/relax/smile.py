@@ -45,7 +45,7 @@ def told_of_smile(reference: Head, table: Responses, drawn_rows, lip: int, openi
     corner = np.array([out, rise + (rows[:1] @ table.jaw_at(opening))[0, 1], rise])
     moves = [corner, corner * [-1, 1, 1], [0, 0, up]]
     sure = [[DEVIATION] * 3] * 2 + [[UNTOLD, UNTOLD, DEVIATION]]
-    return Told(rows, np.array(moves), np.array(sure))
+    return Told(rows, np.array(moves), np.array(sure), smiles=True)
 
 
 def told_of_jaw(told: Told, table: Responses, opening: float) -> Told:
