@@ -15,7 +15,7 @@ from headshop.sim.errors import InputError
 from headshop.sim.mesh import Mesh
 from headshop.sim.mesh_subdivision import drawn, smoother
 from headshop.sim.progress import finish
-from headshop.sim.relax.bunching import borne, swelling
+from headshop.sim.relax.bunching import fleshed
 from headshop.sim.relax.choice import kept_open, neutral_of, require_choice
 from headshop.sim.relax.explain import explain
 from headshop.sim.relax.mouth_gap import first_and_last_edge, lip_edges
@@ -44,7 +44,7 @@ def people(reference, reference_model):
     start = reference.skin.vertices
     asked = control(reference_model, Pose(SMILE, jaw_open=0.2))
     smile = solve(reference_model, asked, max_iterations=150).state.skin - start
-    smile = borne(reference, smile) + swelling(reference, smile)
+    smile = fleshed(reference, smile, 0.2)
     marks = reference.landmark_positions()
     neutral = [start + draw_field(marks, np.random.default_rng(seed))(start) for seed in (3, 4, 5)]
     return [(skin, skin + smile) for skin in neutral]

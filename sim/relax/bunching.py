@@ -13,9 +13,9 @@ from ..anatomy.head import Head
 from ..mesh import vertex_normals
 from .jaw_floor import held_up, pushed_out
 
-#: Thickness of the flesh, mm: our own estimate for the middle of the cheek, of which the table of tissue depths has no row.
-FLESH = 14.0
-ROUNDS = 30  # smoothing steps: flesh spreads what presses it over about its own thickness
+#: Thickness of the flesh, mm: that over the second upper molar, about (Stephan and Simpson 2008, as recalled).
+FLESH = 26.0
+ROUNDS = 60  # smoothing steps: flesh spreads what presses it over about its own thickness
 LEAVES = ("inner", "lip_upper", "lip_lower", "nose", "neck", "scalp", "forehead")
 
 

@@ -11,7 +11,8 @@ At a plane skin, at depth h and distance r from a source of flux q, the flow out
     u = q h / (2 pi r^3)
 
 The mouth's side of the jaw gives room to air and is left out; inside its arch lie tongue and floor of the mouth, which
-go with it, so it is taken for as solid as its convex hull.
+go with it, so it is taken for as solid as its convex hull. Every point of the skin is taken for the plane that touches
+it there: on skin that bends round the jaw the sum is more than the jaw displaces, up to twice.
 """
 
 import numpy as np
