@@ -11,10 +11,12 @@ once, the peers' as the template's own triangles, which is what they register. `
 template's seen part (on partial scans: of its face), are compared with the nearest point of the scan; those that lie
 nearest to an open side of it, or more than `REACH` mm away, have no data and are left out. Goals are judged on these.
 Peers can also be given the template subdivided once, as fine as what we deliver: a row more for information, at the same
-setting, with the seconds that takes, once. Where truth is known, ``truth`` is the mean distance from the template's vertices,
-the same for all methods, to the point of the subject that each should have found. Times are from scan and landmarks in
-memory to the fitted skin, elapsed and of CPU, each the least of `AGAIN` + 1 runs, of ours and of the peers alike; they
-compare within a run only. Prints tables and, on the last line, the same as JSON.
+setting, with the seconds that takes, once. Where the person's own skin is known, a partial scan has a row of how far that
+lies from it: what the scanner got wrong, nearer than which nothing gets but by fitting noise. Where truth is known,
+``truth`` is the mean distance from the template's vertices, the same for all methods, to the point of the subject that each
+should have found. Times are from scan and landmarks in memory to the fitted skin, elapsed and of CPU, each the least of
+`AGAIN` + 1 runs, of ours and of the peers alike; they compare within a run only. Prints tables and, on the last line, the
+same as JSON.
 """
 
 import argparse
@@ -44,6 +46,7 @@ AGAIN = 4  # times that each is timed once more
 SAMPLES, REACH = 40_000, 10.0  # of a surface; mm from the scan
 COUNTS = (20_000, 100_000, 500_000, 2_000_000)
 FINER = ", subdivided once"  # what a peer with the subdivided template is called
+OWN = "the person's own skin"  # what the row of the scan's own errors is called
 #: The most our part of the peers' seconds (of each) and errors (of the better one) should be.
 GOALS = {"nricp_amberg": 1 / 5, "nricp_sumner": 1 / 3, "mean_mm": 1 / 4, "max_mm": 1.0, "truth_mm": 0.7}
 
@@ -91,6 +94,19 @@ def errors(vertices, triangles, subject, scan: Surface, template: Template, face
     return {name: float(value) for name, value in row.items()}
 
 
+def own_errors(vertices, triangles, subject, scan: Surface):
+    """A row of `COLUMNS` for the person's own skin, at its points nearest to our samples of a fitted surface."""
+    skin = Surface(subject.skin.vertices, subject.skin.triangles).closest(sampled(vertices, triangles), REACH)
+    found = scan.closest(skin.points[skin.found], REACH)
+    near = found.distance[found.found & ~found.border]
+    row = dict.fromkeys(COLUMNS, np.nan)
+    return row | {
+        "mean_mm": float(near.mean()),
+        "p95_mm": float(np.percentile(near, 95)),
+        "max_mm": float(near.max()),
+    }
+
+
 def sampled(vertices, triangles):
     """(`SAMPLES`, 3) mm points, even over the area of triangles (t, 3)."""
     rng = np.random.default_rng(0)
@@ -132,6 +148,9 @@ def compared(reference, subjects, template, face, peers):
 
         cage, seconds = adapted(reference, subject)
         mine.setdefault("Head Shop", []).append(seconds | judged_surface(finer, finer.rows @ cage))
+        if subject.skin is not None and subject.kind == "partial":  # of the whole it is the scan
+            near = finer.seen_triangles(face if subject.kind == "partial" else None)
+            mine.setdefault(OWN, []).append(own_errors(finer.rows @ cage, near, subject, scan))
         for peer in peers:
             names = [chosen[subject.kind, peer]] if (subject.kind, peer) in chosen else list(SETTINGS[peer])
             tried = []
@@ -173,11 +192,16 @@ def printed(title, table):
     print(f"\n{title:<44}{heads}")
     first = next(iter(table.values()))
     for name, row in table.items():
-        print(
-            f"{name:<44}{row['seconds']:9.2f}{row['seconds'] / first['seconds']:7.1f}x{row['cpu']:8.2f}"
-            f"{row['cpu'] / first['cpu']:7.1f}x{row['mean_mm']:9.3f}{row['p95_mm']:8.2f}{row['max_mm']:8.2f}"
-            f"{row['truth_mm']:8.2f}{row['flipped']:9.0f}"
-        )
+        cells = [(row["seconds"], "9.2f"), (row["seconds"] / first["seconds"], "7.1f", "x"), (row["cpu"], "8.2f")]
+        cells += [(row["cpu"] / first["cpu"], "7.1f", "x"), (row["mean_mm"], "9.3f"), (row["p95_mm"], "8.2f")]
+        cells += [(row["max_mm"], "8.2f"), (row["truth_mm"], "8.2f"), (row["flipped"], "9.0f")]
+        print(f"{name:<44}" + "".join(cell(*c) for c in cells))
+
+
+def cell(value, shape, unit=""):
+    """A number as text, with its unit; a dash, as wide, where there is none."""
+    text = f"{value:{shape}}{unit}"
+    return text if np.isfinite(value) else f"{'-':>{len(f'{0.0:{shape}}') + len(unit)}}"
 
 
 def judged(table, kind):

@@ -22,13 +22,15 @@ LEVELS = 2  # of subdivision: about 80,000 triangles, as many as the partial sca
 
 @dataclass(frozen=True, eq=False)
 class Subject:
-    """scan : clean, mm; landmarks : name -> mm; truth (n, 3) mm : where each vertex of the template belongs, or None."""
+    """scan : clean, mm; landmarks : name -> mm; truth (n, 3) mm : where each vertex of the template belongs, or None; skin :
+    the person's own, which was scanned, or None."""
 
     name: str
     kind: str
     scan: Mesh
     landmarks: dict[str, np.ndarray]
     truth: np.ndarray | None
+    skin: Mesh | None = None
 
 
 def own_subjects(reference: Head, seed: int) -> list[Subject]:
@@ -40,8 +42,8 @@ def own_subjects(reference: Head, seed: int) -> list[Subject]:
     whole = clean_scan(Mesh.from_triangles(surface.vertices, surface.triangles))[0]
     part = clean_scan(sample.scan)[0]
     return [
-        Subject(f"person {seed}", "whole", whole, sample.landmarks, truth),
-        Subject(f"person {seed}", "partial", part, sample.landmarks, truth),
+        Subject(f"person {seed}", "whole", whole, sample.landmarks, truth, whole),
+        Subject(f"person {seed}", "partial", part, sample.landmarks, truth, whole),
     ]
 
 
