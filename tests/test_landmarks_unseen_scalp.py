@@ -10,12 +10,13 @@ from headshop.sim.adapt.thin_plate_spline import similarity
 from headshop.sim.anatomy.landmark_names import SKIN
 from headshop.sim.landmarks.first_look import first_look
 from headshop.sim.landmarks.pose_search import Pose
-from headshop.sim.landmarks.shape_fit import REST, fit_shape
+from headshop.sim.landmarks.shape_fit import REST, Expression, fit_shape
 from headshop.sim.landmarks.shape_space import shape_space
-from headshop.sim.landmarks.under_hair import fit_under_hair
+from headshop.sim.landmarks.under_hair import HARDLY, LOOSE, fit_under_hair, without_moved
 from headshop.sim.mesh import Mesh
 from headshop.sim.mesh_subdivision import drawn
 from headshop.sim.progress import finish
+from headshop.sim.relax.responses import responses
 
 SKULL = ("v", "op", "eu", "tr")
 BEHIND = 20.0  # mm behind the ears to which the scan goes
@@ -93,3 +94,29 @@ def test_a_scalp_that_is_seen_bare_counts_as_skin(space, person):
     high = space.hairy & (skin[:, 2] > np.median(skin[space.hairy, 2]))
     before, after = (np.linalg.norm(fit.points - skin, axis=1)[high].mean() for fit in (first, second.fit))
     assert after < 0.9 * before
+
+
+def test_what_an_expression_moves_tells_nothing_of_the_skull(space, person, mask):
+    """Cheeks that bulge in a smile change no head."""
+    skin, marks = person
+    table = responses()
+    smile = sum(table.fields[table.names.index(f"zygomaticus_major_{side}")] for side in "lr")[space.vertices]
+    still = without_moved(space)
+    share = still.area / space.area
+    assert share[skin[:, 2] > marks["tr"][2]] == pytest.approx(1)
+    assert share[np.linalg.norm(smile, axis=1) > 4] == pytest.approx(HARDLY)
+    _, seen = mask
+    triangles = space.triangles[seen[space.triangles].all(axis=1)]
+    shown = Expression(parted=True)
+    calm, smiling = (Surface(points, triangles) for points in (skin, skin + smile))
+    start = finish(fit_shape(space, calm, Pose(1.0, np.eye(3), np.zeros(3), 0.0), expression=shown))
+
+    def scalp(space, target):
+        fit = finish(fit_shape(space, target, start.pose, LOOSE, start.coefficients, expression=shown, hair=none))
+        return fit.points[space.hairy & ~seen]
+
+    none = np.zeros(len(skin), dtype=bool)
+    changes = [np.linalg.norm(scalp(s, smiling) - scalp(s, calm), axis=1).mean() for s in (space, still)]
+    assert changes[1] < 0.6 * changes[0], changes
+    used = finish(fit_under_hair(space, smiling, start, shown)).scalp.points[space.hairy & ~seen]
+    assert np.linalg.norm(used - scalp(still, smiling), axis=1).mean() < 0.5 * changes[0]
