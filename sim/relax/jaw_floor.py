@@ -5,7 +5,7 @@ The simulated tissue is a layer of skin over what lies deeper. Between the jaw a
 muscle, gland and tongue, as incompressible as water, and an opening jaw presses into it from above and in front: the
 skin under the chin and behind the angles of the jaw bulges. To first order the flesh flows as a fluid without
 vortices does. The surface of the jaw is strewn with sources as strong as it advances; the skin is free, so that the
-pressure on it is none, and each source has its mirror image outside, a sink (Lamb, Hydrodynamics, 1932, articles 56 and 60).
+pressure on it is none, and each source has its mirror image outside, a sink (Lamb, Hydrodynamics, 1932, chapter III).
 At a plane skin, at depth h and distance r from a source of flux q, the flow outward is then
 
     u = q h / (2 pi r^3)
