@@ -81,9 +81,7 @@ def errors(vertices, triangles, subject, scan: Surface, template: Template, face
     seen[template.used] = True
     if subject.kind == "partial":
         seen &= face
-    found = scan.closest(sampled(vertices, triangles), REACH)
-    near = found.distance[found.found & ~found.border]
-    row = {"mean_mm": near.mean(), "p95_mm": np.percentile(near, 95), "max_mm": near.max(), "truth_mm": np.nan}
+    row = off(sampled(vertices, triangles), scan) | {"truth_mm": np.nan}
     own = template.triangles[seen[template.triangles].all(axis=1)]
     if subject.truth is None:  # beside its neighbours a flipped triangle looks the other way
         row["flipped"] = turned_from_neighbours(vertices[:n], own)
@@ -97,14 +95,14 @@ def errors(vertices, triangles, subject, scan: Surface, template: Template, face
 def own_errors(vertices, triangles, subject, scan: Surface):
     """A row of `COLUMNS` for the person's own skin, at its points nearest to our samples of a fitted surface."""
     skin = Surface(subject.skin.vertices, subject.skin.triangles).closest(sampled(vertices, triangles), REACH)
-    found = scan.closest(skin.points[skin.found], REACH)
+    return dict.fromkeys(COLUMNS, np.nan) | off(skin.points[skin.found], scan)
+
+
+def off(points, scan: Surface):
+    """How far points (k, 3) mm that have data lie from the scan: the part of a row that tells of the surface."""
+    found = scan.closest(points, REACH)
     near = found.distance[found.found & ~found.border]
-    row = dict.fromkeys(COLUMNS, np.nan)
-    return row | {
-        "mean_mm": float(near.mean()),
-        "p95_mm": float(np.percentile(near, 95)),
-        "max_mm": float(near.max()),
-    }
+    return {"mean_mm": float(near.mean()), "p95_mm": float(np.percentile(near, 95)), "max_mm": float(near.max())}
 
 
 def sampled(vertices, triangles):
@@ -149,8 +147,7 @@ def compared(reference, subjects, template, face, peers):
         cage, seconds = adapted(reference, subject)
         mine.setdefault("Head Shop", []).append(seconds | judged_surface(finer, finer.rows @ cage))
         if subject.skin is not None and subject.kind == "partial":  # of the whole it is the scan
-            near = finer.seen_triangles(face if subject.kind == "partial" else None)
-            mine.setdefault(OWN, []).append(own_errors(finer.rows @ cage, near, subject, scan))
+            mine.setdefault(OWN, []).append(own_errors(finer.rows @ cage, finer.seen_triangles(face), subject, scan))
         for peer in peers:
             names = [chosen[subject.kind, peer]] if (subject.kind, peer) in chosen else list(SETTINGS[peer])
             tried = []

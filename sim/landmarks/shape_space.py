@@ -17,6 +17,7 @@ from ..adapt.shut_eyes import with_shut_eyes
 from ..anatomy.head import Head
 from ..anatomy.landmark_names import SKIN
 from ..mesh_subdivision import drawn
+from ..relax.responses import answers, responses
 from ..scan.individual import variation
 
 #: Smooth displacements: reach in mm, standard deviation in mm, whether for the face only.
@@ -32,6 +33,7 @@ SHUT = 0.7  # how far an eye is shut, one standard deviation
 HELD = 0.1  # how far an eye is shut of which it is known whether it is, one standard deviation
 OPENED = 1.2  # standard deviations of the jaw by which a mouth is open that is open at all
 NAPE = (15.0, 25.0)  # mm behind the hindmost point of the ear, and above the chin
+MOVED = 3.0  # mm
 JAW_OPEN = 0.12  # rad, one standard deviation
 #: A smile moves the corners of the mouth outward, back and up, mm; one standard deviation.
 SMILE, SMILE_REACH = (4.0, 3.0, 4.0), 20.0
@@ -53,6 +55,7 @@ class ShapeSpace:
     area (n,) mm² : surface around each point
     face, ear (n,) 0..1 : membership
     hairy (n,) bool : skin on which hair grows: the scalp, and the nape behind the ears
+    moving (n,) bool : skin that jaw and muscles of the lower face may move by more than `MOVED`
     names (k,) : landmarks; corners (k, 3), weights (k, 3) : where they ride on the points
     """
 
@@ -69,6 +72,7 @@ class ShapeSpace:
     face: np.ndarray
     ear: np.ndarray
     hairy: np.ndarray
+    moving: np.ndarray
     names: tuple[str, ...]
     corners: np.ndarray
     weights: np.ndarray
@@ -142,6 +146,7 @@ def shape_space(head: Head) -> ShapeSpace:
         face,
         ear,
         (group("scalp") > 0.5) | _nape(points, landmarks) & (np.maximum(face, ear) < 0.1),
+        (responses().reach > MOVED)[outside] if answers(head) else np.zeros(len(points), dtype=bool),
         tuple(head.landmarks.names[k] for k in marks),
         index[head.landmarks.corners[marks]],
         head.landmarks.weights[marks],

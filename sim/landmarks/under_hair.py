@@ -17,7 +17,6 @@ from scipy.spatial import cKDTree
 from ..adapt.closest import Surface
 from ..adapt.ears import EAR_MARKS
 from ..adapt.scan_surface import cuts_of
-from ..relax.responses import responses
 from ..scan.flat_cuts import beyond
 from .confidence import LIKE_AN_EAR, like_ears
 from .shape_fit import CHANGE, STANDS_OFF, Expression, ShapeFit, Told, fit_shape, part_of
@@ -47,9 +46,9 @@ OFF = 4.0  # mm by which hair stands off there
 #: of the skull behind, and a fit that explains it bends that: given the faces of seven heads and a mannequin, such a fit was
 #: 14.1 mm off their skulls (95th percentile), this one is 7.4; given nine faces of ICT-FaceKit, 9.1 and 9.7.
 LOOSE = ((1.0, 8.0, 2.5, 4.5),) * 6
-#: mm: skin that jaw and muscles may move farther tells next to nothing of the skull behind a face whose lips are parted. Six
-#: smiles of ICT-FaceKit were 12.8 mm off their unseen skulls with it (95th percentile), 11.0 without.
-MOVED, HARDLY = 3.0, 0.02
+#: How much skin that expressions move tells of the skull behind a face whose lips are parted. Six smiles of ICT-FaceKit were
+#: 12.8 mm off their unseen skulls with all of it (95th percentile), 11.0 with so little.
+HARDLY = 0.02
 
 #: Landmarks that such a fit tells where they are not seen.
 SKULL = ("v", "op", "eu")
@@ -114,10 +113,7 @@ def fit_under_hair(space: ShapeSpace, target: Surface, fit: ShapeFit, shown: Exp
 
 def without_moved(space: ShapeSpace) -> ShapeSpace:
     """``space`` in which skin that expressions of the lower face move counts for hardly anything."""
-    reach = responses().reach
-    if space.vertices.max() >= len(reach):  # another head than that of the table
-        return space
-    return replace(space, area=space.area * np.where(reach[space.vertices] > MOVED, HARDLY, 1.0))
+    return replace(space, area=space.area * np.where(space.moving, HARDLY, 1.0))
 
 
 def about_ears(space: ShapeSpace, sides: Collection[str]) -> np.ndarray:

@@ -18,7 +18,7 @@ from ..tissue.jaw import jaw_transform
 from .explain import Expression, explain
 from .mouth_gap import lip_edges, opening, smoothed
 from .people import covariance
-from .responses import MOUTH, responses
+from .responses import MOUTH, answers, responses
 
 #: Landmarks that expressions of the mouth leave where they are.
 STILL = (
@@ -69,11 +69,6 @@ def parted_lips(reference: Head, target: Surface, given, lips=None) -> PartedLip
     middle = pairs[np.abs(shares).argmin()]
     gap = np.diff((reference.skin.vertices + expression.modelled)[middle], axis=0)[0]
     return PartedLips(expression, rim, edges) if np.linalg.norm(gap) > TOLD else None
-
-
-def answers(reference: Head) -> bool:
-    """Whether the table of responses was made of a head with this skin's vertices."""
-    return responses().jaw.shape[1] == len(reference.skin.vertices)
 
 
 def rim_pairs(reference: Head):

@@ -20,9 +20,8 @@ from ..anatomy.head import Head
 from ..mesh_subdivision import smoother
 from .close_lips import lips_closed, lips_rounded
 from .explain import explain
-from .parted import answers
 from .people import covariance
-from .responses import responses
+from .responses import answers, responses
 from .smile import CORNERS, SMILE, lifted, told_of_jaw, told_of_smile
 from .upper_teeth import TOLD, told_of_stomion
 

@@ -11,6 +11,8 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import cKDTree
 
+from ..anatomy.head import Head
+
 TABLE = Path(__file__).resolve().parents[2] / "assets" / "tables" / "expression_responses.npz"
 
 #: Openings of the jaw that are simulated, shares of its widest.
@@ -75,6 +77,11 @@ def responses(path=TABLE) -> Responses:
             names += [f"{name}_l", f"{name}_r"]
             out += [field, field[mirror] * [-1, 1, 1]]
     return Responses(tuple(names), np.array(out), jaw)
+
+
+def answers(reference: Head) -> bool:
+    """Whether the table of responses was made of a head with this skin's vertices."""
+    return responses().jaw.shape[1] == len(reference.skin.vertices)
 
 
 def mirrored_vertices(vertices: np.ndarray) -> np.ndarray:
