@@ -157,10 +157,20 @@ def test_jaw_opens_in_its_joint(head):
     rotation, translation = jaw_transform(jaw, 1.0)
     incisor = rotation @ jaw.incisor + translation
     assert incisor[2] < jaw.incisor[2] - 33 and abs(incisor[0]) < 1e-9
-    # The first third turns almost purely; then the condyles slide forward and down.
-    third, full = (slid(jaw, (x, 0, 0))[0] for x in (0.33, 1.0))
-    assert np.linalg.norm(third) < 2 and 6 < np.linalg.norm(full) < 12
-    assert full[1] < -4 and full[2] < -2
+    # The condyles slide forward and down from the first millimetre on.
+    tenth, full = (slid(jaw, (x, 0, 0))[0] for x in (0.1, 1.0))
+    np.testing.assert_allclose(tenth, 0.1 * full, atol=0.1)
+    assert 10 < np.linalg.norm(full) < 12 and full[1] < -4 and full[2] < -2
+
+
+@pytest.mark.parametrize("opening", [0.1, 0.5, 1.0])
+def test_an_opening_jaw_turns_about_a_point_below_its_condyles(head, opening):
+    """32 mm below them, deviation 7, and 0 behind, deviation 11 (Mehl et al. 2025); our slide is one of the shorter ones."""
+    rotation, translation = jaw_transform(head.jaw, opening)
+    fixed = np.linalg.solve(np.eye(2) - rotation[1:, 1:], translation[1:])
+    behind, above = fixed - (head.jaw.condyle_l + head.jaw.condyle_r)[1:] / 2
+    assert -32.4 < above < -32.4 + 2.2 * 7.4
+    assert -2 * 10.8 < behind < 2 * 10.8
 
 
 def slid(jaw, pose):

@@ -84,7 +84,7 @@ def test_an_open_smile_becomes_neutral(reference, people):
         truth, found, before = (marks_on(reference, cage) for cage in (neutral, result.skin, smiling))
         for corner in CORNERS:
             assert np.linalg.norm(before[corner] - truth[corner]) > 6
-            assert np.linalg.norm(found[corner] - truth[corner]) < 2.6
+            assert np.linalg.norm(found[corner] - truth[corner]) < 3.3
         assert np.percentile(away(reference, result.skin, neutral), 95) < 1.5
         assert 2 < result.report["jaw_degrees"] < 11
         assert next(iter(result.report["muscles"])).startswith("zygomaticus_major")

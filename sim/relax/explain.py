@@ -27,7 +27,7 @@ OPEN = 1.0  # opening of the jaw that shrinkage expects
 #: How far a smiling jaw opens otherwise than by its share in joy: teeth of people who smile are apart by some millimetres.
 PART = 0.07
 SMILE = 2.0  # strength of a smile, by the joy of the table of expressions, that it expects
-ALONE = 0.5  # contraction of a muscle beyond its share in the smile
+ALONE = 0.7  # contraction of a muscle beyond its share in the smile
 UNEVEN = 0.15  # difference between the sides
 ROUNDS = 3
 

@@ -28,7 +28,7 @@ from .upper_teeth import TOLD, told_of_stomion
 #: Skin that the muscles and jaw move by less holds the face in place, mm; of it, points this far apart are looked at.
 UNMOVED, COARSE = 0.25, 30.0
 ROUND = 16.0  # mm between the points that are looked at on the cheeks
-NOISE = 1.0  # mm by which a landmark may be wrong
+NOISE = 1.5  # mm by which a landmark may be wrong, along each axis
 UNSURE = 0.02  # trust in skin without data, of 1
 ROUNDED = 0.5  # height of an open mouth, of its width, from which on its own muscle rounds it, nobody knows how far
 #: Muscles that press the lips or pull them down: a person's own chin looks too much like what they do; and what purses lips.

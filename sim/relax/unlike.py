@@ -19,7 +19,7 @@ from .responses import Responses
 ASIDE, ALONG = 0.4, 0.4
 RIGID = 0.15  # the same of what follows the jaw as a whole
 #: Its reaches in mm with their shares of the variance.
-REACHES = ((12.0, 0.3), (6.0, 0.7))
+REACHES = ((10.0, 0.3), (5.0, 0.7))
 LEAST = 0.4  # mm of deviation where little moves, at the mouth
 EVEN = 0.8  # correlation between the sides
 MIRROR = np.array([-1.0, 1, 1])

@@ -2,9 +2,12 @@
 """The hinge of the jaw: rotation about the axis through both condyles while they slide forward and down the articular
 eminence; protrusion and sideways motion.
 
-Opening begins as rotation and the slide follows (Posselt's border movement: the first third turns almost purely). To the
-side the jaw turns about the condyle of that side, which stays but for a small shift outward (Bennett), while the other
-one slides forward, down and inward. The wider the mouth, the less is left of either (Posselt's envelope of motion).
+A mouth that opens freely does both from its first millimetre on (motion analyser, doi 10.21203/rs.3.rs-3913755), and the
+whole turns about a point well below the condyles, 32 mm by Mehl et al. 2025 (doi 10.1007/s00784-025-06619-4): the slide
+is taken for proportional to the angle. Only a jaw held back turns first and slides later, as on Posselt's border.
+
+To the side the jaw turns about the condyle of that side, which stays but for a small shift outward (Bennett), while the
+other one slides forward, down and inward. The wider the mouth, the less is left of either (Posselt's envelope of motion).
 """
 
 from functools import lru_cache
@@ -95,7 +98,7 @@ def jaw_transform(jaw: Jaw, opening: float, forward: float = 0.0, side: float = 
     rotation = _rotation(axis, opening * jaw.open_max + guide / hypot(*ahead))
     if (rotation @ ahead - ahead) @ up > 0:  # opening lowers the incisors, whichever way the axis points
         rotation = rotation.T
-    shift = (jaw.slide_max * opening**1.7 + jaw.forward_max * ahead_of) * path
+    shift = (jaw.slide_max * opening + jaw.forward_max * ahead_of) * path
     shift -= _BACKWARD * jaw.forward_max * back_of * front
     translation = pivot + shift - rotation @ pivot
     if side == 0:
