@@ -12,7 +12,7 @@ from ..scan.individual import variation
 
 #: Differences beyond the norms: reach in mm, deviation in mm along each axis. Neutral faces alone would have about half of
 #: that; with more, less of a person is taken for an expression that our muscles do not have.
-BEYOND = ((30.0, 3.0), (14.0, 2.0))
+BEYOND = ((45.0, 3.0), (18.0, 2.0))
 
 
 def covariance(landmarks, points, still) -> np.ndarray:
