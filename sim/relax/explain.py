@@ -85,11 +85,10 @@ def explain(
         y, noise = np.append(y, told.moves), np.append(noise, told.deviations)
         people = np.pad(people, (0, told.moves.size))
     sampled = np.stack([(rows @ field).ravel() for field in fields], axis=1)
-    smiles = told is not None and told.smiles
-    shrink = shrinkage([table.names[k] for k in pick], smiles)
+    shrink = shrinkage([table.names[k] for k in pick], told is not None and told.smiles)
     opening, contraction = 0.2, np.full(len(pick), 0.3)
     for _ in range(ROUNDS):
-        others = unlike(table, fields, vertices, jaw, opening, contraction, smiles)
+        others = unlike(table, fields, vertices, jaw, opening, contraction)
         factor = cho_factor(people + others.covariance(rows) + np.diag(noise**2), lower=True)
         step = max(opening, 0.05)
         by_jaw = (rows @ table.jaw_at(step)).ravel() / step

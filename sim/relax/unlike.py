@@ -18,8 +18,8 @@ from .responses import Responses
 #: Deviation as a share of what our muscles do: to any side, and more or less of the same.
 ASIDE, ALONG = 0.4, 0.4
 RIGID = 0.15  # the same of what follows the jaw as a whole
-#: Its reaches in mm with their shares of the variance; what a smile does otherwise is finer than what a jaw does.
-REACHES, SMILING = ((12.0, 0.3), (6.0, 0.7)), ((10.0, 0.3), (5.0, 0.7))
+#: Its reaches in mm with their shares of the variance.
+REACHES = ((12.0, 0.3), (6.0, 0.7))
 LEAST = 0.4  # mm of deviation where little moves, at the mouth
 EVEN = 0.8  # correlation between the sides
 MIRROR = np.array([-1.0, 1, 1])
@@ -30,20 +30,18 @@ PARTED = 0.35
 @dataclass(frozen=True, eq=False)
 class Unlike:
     """places (n, 3) mm : the skin with its lips parted; aside (n,) mm : deviation to any side; along (n, 3) mm : the same
-    along the way of the muscles; reaches : as `REACHES`."""
+    along the way of the muscles."""
 
     places: np.ndarray
     aside: np.ndarray
     along: np.ndarray
-    reaches: tuple = REACHES
 
     def covariance(self, rows, others=None) -> np.ndarray:
         """(3 a, 3 b) mm² between what ``rows`` (a, n) sparse and ``others`` (b, n) give of the skin; None: every vertex,
         and the same as ``rows``."""
         one = self._at(rows)
         other = one if others is None else self._at(others)
-        near, across = (likeness(one[0], other[0] * side, self.reaches) for side in (1, MIRROR))
-        across *= EVEN
+        near, across = likeness(one[0], other[0]), EVEN * likeness(one[0], other[0] * MIRROR)
         size = one[1][:, None] * other[1][None, :]
         out = np.kron(near * size, np.eye(3)) + np.kron(across * size, np.diag(MIRROR))
         return out + np.einsum("ik,jl,ij->ikjl", one[2], other[2], near + across).reshape(out.shape)
@@ -53,10 +51,9 @@ class Unlike:
         return fields if rows is None else tuple(rows @ field for field in fields)
 
 
-def unlike(table: Responses, fields, vertices, jaw: Jaw, opening: float, contraction, smiles: bool = False) -> Unlike:
+def unlike(table: Responses, fields, vertices, jaw: Jaw, opening: float, contraction) -> Unlike:
     """`Unlike` of a skin (n, 3) mm whose ``jaw`` is open by ``opening`` and whose muscles, ``fields`` (k, n, 3) mm, contract
-    by ``contraction`` (k,); ``smiles``: whether they are known to smile."""
-    reaches = SMILING if smiles else REACHES
+    by ``contraction`` (k,)."""
     places = vertices + table.jaw_at(PARTED)
     moved = ((np.linalg.norm(fields, axis=2) * contraction[:, None]) ** 2).sum(axis=0)
     by_jaw = table.jaw_at(opening)
@@ -66,16 +63,16 @@ def unlike(table: Responses, fields, vertices, jaw: Jaw, opening: float, contrac
     near = np.clip(table.reach / 6.0, 0, 1)
     aside = ASIDE**2 * (moved + np.minimum(whole, between)) + RIGID**2 * whole + (LEAST * near) ** 2
     # At the midline both sides add up to no more than elsewhere.
-    once = 1 / np.sqrt(1 + EVEN * correlation(((places - places * MIRROR) ** 2).sum(axis=1), reaches))
+    once = 1 / np.sqrt(1 + EVEN * correlation(((places - places * MIRROR) ** 2).sum(axis=1)))
     along = ALONG * np.einsum("k,knj->nj", contraction, fields)
-    return Unlike(places, np.sqrt(aside) * once, along * once[:, None], reaches)
+    return Unlike(places, np.sqrt(aside) * once, along * once[:, None])
 
 
-def likeness(a, b, reaches=REACHES) -> np.ndarray:
+def likeness(a, b) -> np.ndarray:
     """(j, k) correlation between points (j, 3) and (k, 3) mm."""
-    return correlation(cdist(a, b, "sqeuclidean"), reaches)
+    return correlation(cdist(a, b, "sqeuclidean"))
 
 
-def correlation(apart, reaches=REACHES) -> np.ndarray:
+def correlation(apart) -> np.ndarray:
     """Correlation at squared distances, mm²."""
-    return sum(share * np.exp(-apart / (2 * reach**2)) for reach, share in reaches)
+    return sum(share * np.exp(-apart / (2 * reach**2)) for reach, share in REACHES)
