@@ -12,11 +12,12 @@ from headshop.sim.adapt.landmarks import read_landmarks
 from headshop.sim.adapt.rest import rest_of
 from headshop.sim.adapt.skin_fit import fit_skin, landmark_rows
 from headshop.sim.errors import InputError
-from headshop.sim.mesh import Mesh
+from headshop.sim.mesh import Mesh, vertex_normals
 from headshop.sim.mesh_subdivision import drawn, smoother
 from headshop.sim.progress import finish
 from headshop.sim.relax.bunching import fleshed
 from headshop.sim.relax.choice import kept_open, neutral_of, require_choice
+from headshop.sim.relax.close_lips import corners_smoothed
 from headshop.sim.relax.explain import explain
 from headshop.sim.relax.mouth_gap import first_and_last_edge, lip_edges
 from headshop.sim.relax.relaxed import relaxed
@@ -138,6 +139,30 @@ def test_what_is_told_of_smiles_is_heeded(reference):
     assert lifted(told, table, heeded) > LEAST and near < 0.7 * far
     stronger = told_of_smile(reference, table, as_drawn, rest_of(reference).lip_pairs[0, 0], 0.2, lift=1.3)
     assert np.all(np.abs(stronger.moves[0]) > np.abs(told.moves[0])) and stronger.moves[2, 2] > told.moves[2, 2]
+
+
+def test_what_an_expression_folds_beside_the_mouth_goes_and_the_corners_stay(reference):
+    rest, start = rest_of(reference), reference.skin.vertices
+    corner = reference.landmark_positions()["ch_l"]
+
+    def bump(at):
+        """A bump outward, 2 mm high and 3 mm wide, on the skin nearest to ``at`` (3,) mm."""
+        seen = np.flatnonzero(~rest.inner)
+        there = start[seen[np.linalg.norm(start[seen] - at, axis=1).argmin()]]
+        return 2 * np.exp(-((start - there) ** 2).sum(axis=1) / (2 * 3.0**2)) * ~rest.inner
+
+    def left(field):
+        """How high it is after smoothing, of what it was; and that skin, (n, 3) mm."""
+        out = corners_smoothed(rest, start + field[:, None] * normals, np.eye(3))
+        return ((out - start) * normals).sum(axis=1)[field.argmax()] / field.max(), out
+
+    normals = vertex_normals(start, reference.skin.triangles)
+    near, smooth = left(bump(corner + [8, 4, 0]))
+    assert near < 0.5
+    assert left(bump(corner + [28, 25, 0]))[0] > 0.9
+    before, after = (marks_on(reference, cage) for cage in (start, smooth))
+    assert np.linalg.norm(before["ch_l"] - after["ch_l"]) < 0.2
+    np.testing.assert_allclose(corners_smoothed(rest, start, np.eye(3)), start, atol=1e-6)
 
 
 def test_the_same_head_elsewhere_relaxes_to_the_same(reference, people):

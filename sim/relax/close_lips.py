@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Lips laid on each other exactly, and what surrounds them smoothly after."""
+"""Lips laid on each other exactly, and what surrounds them smoothly after; no folds of an expression beside the mouth."""
 
 import numpy as np
 from scipy.sparse import coo_matrix, diags
 from scipy.spatial import cKDTree
 
 from ..adapt.rest import Rest
+from ..adapt.skin_fit import landmark_rows
 from ..adapt.smooth_system import factorised
 
 #: Skin within the first distance of the lips, mm, gives way freely, beyond the second it hardly does.
@@ -15,6 +16,9 @@ MEET = 200.0  # pull of a pair of points on each other
 #: Pull of lips toward where they were, as they get the reference's roundness back, and of skin this far from where they
 #: meet, mm: the scan shows how high the red is, but not the roundness of what was stretched.
 KEEP, KEPT, BEYOND = 0.003, 30.0, 9.0
+#: mm about a corner of the mouth in which folds are the expression's, farther off less and less of them; pull on the corner.
+FOLDS, CORNER = 22.0, 10.0
+CORNERS = ("ch_l", "ch_r")
 
 
 def lips_closed(rest: Rest, skin, matrix) -> np.ndarray:
@@ -42,6 +46,24 @@ def lips_rounded(rest: Rest, skin, matrix) -> np.ndarray:
     keep = KEEP * (KEPT / KEEP) ** np.clip(away / BEYOND, 0, 1)
     system = rest.energy + diags(keep) + MEET * (apart.T @ apart)
     right = keep[:, None] * (skin - base) + MEET * (apart.T @ (want - apart @ base))
+    return base + factorised(system)(right)
+
+
+def corners_smoothed(rest: Rest, skin, matrix) -> np.ndarray:
+    """Skin (n, 3) mm that beside the corners of the mouth differs as smoothly from the reference's as can be.
+
+    What a smile folds there, and an open mouth stretches, is no part of the neutral face, and no model of muscles is as fine as
+    to take it away. matrix (3, 3) as in `lips_closed`; lips keep meeting and corners stay where they are.
+    """
+    start = rest.head.skin.vertices
+    base = start @ matrix.T
+    apart, want = pairs_apart(rest, matrix)
+    corners = landmark_rows(rest.head.landmarks, CORNERS, len(start))
+    away = cKDTree(corners @ start).query(start)[0]
+    keep = KEEP * (KEPT / KEEP) ** np.clip(away / FOLDS, 0, 1)
+    system = rest.energy + diags(keep) + MEET * (apart.T @ apart) + CORNER * (corners.T @ corners)
+    right = keep[:, None] * (skin - base) + MEET * (apart.T @ (want - apart @ base))
+    right += CORNER * (corners.T @ (corners @ (skin - base)))
     return base + factorised(system)(right)
 
 

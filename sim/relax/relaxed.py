@@ -18,11 +18,11 @@ from ..adapt.skin_fit import landmark_rows
 from ..adapt.thin_plate_spline import similarity
 from ..anatomy.head import Head
 from ..mesh_subdivision import smoother
-from .close_lips import lips_closed, lips_rounded
+from .close_lips import CORNERS, corners_smoothed, lips_closed, lips_rounded
 from .explain import explain
 from .people import covariance
 from .responses import answers, responses
-from .smile import CORNERS, SMILE, lifted, told_of_jaw, told_of_smile
+from .smile import SMILE, lifted, told_of_jaw, told_of_smile
 from .upper_teeth import TOLD, told_of_stomion
 
 #: Skin that the muscles and jaw move by less holds the face in place, mm; of it, points this far apart are looked at.
@@ -100,7 +100,8 @@ def relaxed(reference: Head, skin, fitted, unseen=None, teeth=()) -> Relaxed:
         told = told_of_jaw(told, table, found.jaw)
         found = explain(table, cage, reference.jaw, rows, offsets, people, noise, muscles, known, told)
     out = skin - found.displacement @ matrix.T
-    out = lips_rounded(rest, lips_closed(rest, out, matrix), matrix)
+    for smoothing in (lips_closed, lips_rounded, corners_smoothed):
+        out = smoothing(rest, out, matrix)
     moved = np.linalg.norm(out - skin, axis=1)[~rest.inner]
     strongest = sorted(found.muscles, key=lambda name: (-found.muscles[name], name))
     report = {

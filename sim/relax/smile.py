@@ -13,6 +13,7 @@ from scipy.sparse import csr_matrix, vstack
 
 from ..adapt.skin_fit import landmark_rows
 from ..anatomy.head import Head
+from .close_lips import CORNERS
 from .explain import Expression, Told
 from .responses import Responses
 
@@ -24,7 +25,6 @@ DEVIATION = 1.8
 HEEDED = 0.33
 UNTOLD = 1e3  # mm: nothing is known along that axis
 SMILE = 0.33  # share of a smile's lift of the corners from which on an expression is one
-CORNERS = ("ch_l", "ch_r")
 
 
 def told_of_smile(reference: Head, table: Responses, drawn_rows, lip: int, opening: float, lift: float = 1.0) -> Told:
