@@ -84,6 +84,25 @@ def test_a_head_built_of_a_mask_says_its_scalp_is_invented(space, person, mask, 
     assert np.mean(off) < 12.0
 
 
+def test_a_picked_back_of_the_head_is_heeded_and_a_guessed_one_is_not(space, person, mask, reference):
+    """A head is built to where it was picked to end, though the scan shows nothing of it."""
+    skin, marks = person
+    scan, _ = mask
+    far = marks | {"op": marks["op"] + [0.0, 18.0, 0.0]}
+
+    def ends(given, found=()):
+        look = finish(first_look(reference, Surface(scan.vertices, scan.triangles), given, found=found))
+        high = look.filled.vertices[np.abs(look.filled.vertices[:, 2] - marks["op"][2]) < 25]
+        return high[:, 1].max()
+
+    without = {n: p for n, p in marks.items() if n != "op"}
+    assert ends(far) == pytest.approx(far["op"][1], abs=3.0)
+    assert ends(far) > ends(without) + 10
+    assert ends(far, found=("op",)) == pytest.approx(ends(without), abs=0.5)
+    head = finish(build_head(reference, scan, far, detail=0)).head
+    assert abs(head.landmark_positions()["op"] - far["op"])[1] < 3.0
+
+
 def test_a_scalp_that_is_seen_bare_counts_as_skin(space, person):
     """Before it is known to be, it is mistrusted: what stands off it could be hair."""
     skin, _ = person

@@ -4,6 +4,7 @@
 Where lids are, what hangs out of the mouth and is no skin, and what is hair.
 """
 
+from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -14,6 +15,7 @@ from ..adapt.thin_plate_spline import similarity
 from ..anatomy.head import Head
 from ..progress import Work
 from ..relax.mouth_gap import MARKS
+from .confidence import MID_AIR
 from .expression import fit_expression
 from .held_by_lips import held_by_lips
 from .hidden_skin import UNSEEN, hidden_skin, unseen_scalp, with_hidden_skin
@@ -55,10 +57,17 @@ class FirstLook:
         return replace(fit, target=self.target, fitted=replace(fit.fitted, fitted=fitted, distance=distance))
 
 
-def first_look(reference: Head, target: Surface, given: dict[str, np.ndarray], keep_held: bool = False) -> Work:
+def first_look(
+    reference: Head,
+    target: Surface,
+    given: dict[str, np.ndarray],
+    keep_held: bool = False,
+    found: Collection[str] = (),
+) -> Work:
     """Work returning the `FirstLook` at the scan ``target`` with the landmarks ``given`` (name -> (3,) mm).
 
     keep_held : what the lips hold, and hair, is to be taken for skin
+    found : names of those given that nobody picked: in mid-air they are guesses
     """
     rest = reference.landmark_positions()
     names = [name for name in given if name in rest]
@@ -70,7 +79,9 @@ def first_look(reference: Head, target: Surface, given: dict[str, np.ndarray], k
     try:
         fit = yield from run(fit_shape(space, coarse, Pose(scale, matrix / scale, shift, 0.0)), 0.0, 0.6, LOOKING)
         fit, shown = yield from run(fit_expression(space, coarse, fit), 0.6, 0.9, LOOKING)
-        hair = yield from run(fit_under_hair(space, coarse, fit, shown, given), 0.9, 1.0, LOOKING)
+        skull = {n: given[n] for n in names if n.partition("_")[0] in SKULL and n not in found}
+        skull = {n: p for n, p in skull.items() if coarse.closest(p[None]).distance[0] > MID_AIR * scale}
+        hair = yield from run(fit_under_hair(space, coarse, fit, shown, given, skull), 0.9, 1.0, LOOKING)
     except NoFaceError:
         return FirstLook(given, target, target)
     landmarks = given | lids_told(space, fit, shown, coarse, given)

@@ -17,6 +17,7 @@ from scipy.spatial import cKDTree
 from ..adapt.closest import Surface
 from ..adapt.ears import EAR_MARKS
 from ..adapt.scan_surface import cuts_of
+from ..mesh import vertex_normals
 from ..scan.flat_cuts import beyond
 from .confidence import LIKE_AN_EAR, like_ears
 from .shape_fit import CHANGE, STANDS_OFF, Expression, ShapeFit, Told, fit_shape, part_of
@@ -66,20 +67,34 @@ class UnderHair:
     far: np.ndarray
 
 
-def fit_under_hair(space: ShapeSpace, target: Surface, fit: ShapeFit, shown: Expression, given: Collection[str] = ()):
+def fit_under_hair(
+    space: ShapeSpace,
+    target: Surface,
+    fit: ShapeFit,
+    shown: Expression,
+    given: Collection[str] = (),
+    skull: dict[str, np.ndarray] | None = None,
+):
     """A generator: yields the fraction done, returns `UnderHair` of a ``fit`` to the scan ``target``.
 
-    shown : the expression of ``fit``; given : names of landmarks that are known: an ear that has any is no hair
+    shown : the expression of ``fit``; given : names of landmarks that are known: an ear that has any is no hair; skull : name
+    -> (3,) mm, those of `SKULL` that are known where the scan shows nothing
     """
     covered = under_hair(space, fit, target)
     if not covered.any():
         work = fit_shape(space, target, fit.pose, CHANGE, fit.coefficients, 1, shown, hair=covered)
-        fit = yield from part_of(work, 0, 2)
+        fit = yield from part_of(work, 0, 3)
         telling = without_moved(space) if shown.parted else space
         work = fit_shape(telling, target, fit.pose, LOOSE, fit.coefficients, 1, shown, hair=covered)
-        return UnderHair(fit, (yield from part_of(work, 1, 2)), covered, covered)
+        scalp = yield from part_of(work, 1, 3)
+        if skull:
+            told = told_of_skull(space, scalp, skull)
+            work = fit_shape(telling, target, scalp.pose, LOOSE, scalp.coefficients, 1, shown, told, covered)
+            scalp = yield from part_of(work, 2, 3)
+        return UnderHair(fit, scalp, covered, covered)
     bare = np.flatnonzero(in_face(space, fit, {}, INNER))
     held = Told(np.repeat(bare[:, None], 3, axis=1), np.full((len(bare), 3), 1 / 3), fit.points[bare])
+    held = held.and_of(told_of_skull(space, fit, skull) if skull else None)
     outside = ~in_face(space, fit, {}, EDGE)
 
     def without(sides):
@@ -109,6 +124,17 @@ def fit_under_hair(space: ShapeSpace, target: Surface, fit: ShapeFit, shown: Exp
     for side in hidden:
         covered |= _ear(space, side)
     return UnderHair(fit, fit, covered, covered & far)  # hair tells more of the scalp than a looser fit
+
+
+def told_of_skull(space: ShapeSpace, fit: ShapeFit, skull: dict[str, np.ndarray]) -> Told:
+    """What landmarks of the skull, name -> (3,) mm, tell: how high the skin lies there, and little of where along it."""
+    told = Told.of(space, skull)
+    at, across = (
+        np.einsum("kij,ki->kj", field[told.corners], told.weights)
+        for field in (fit.points, vertex_normals(fit.points, space.triangles))
+    )
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    return replace(told, places=at + np.einsum("ij,ij->i", told.places - at, across)[:, None] * across)
 
 
 def without_moved(space: ShapeSpace) -> ShapeSpace:
