@@ -161,6 +161,23 @@ def test_hair_is_left_out_and_the_face_is_not(kind, reference, request):
     assert kept[off > 0.8 * SHORT].mean() < 0.3  # hair
 
 
+def test_a_picked_back_of_the_head_is_heeded_where_hair_is_seen_elsewhere(reference, shaggy):
+    scan, _, truth = shaggy
+    behind = truth["t_l"][1] + 40
+    shown = ~(scan.vertices[scan.triangles][:, :, 1] > behind).any(axis=1)
+    scan = Surface(scan.vertices, scan.triangles[shown], smooth=2.0)
+    assert scan.vertices[:, 1].max() < truth["op"][1] - 20
+
+    def ends(**more):
+        look = finish(first_look(reference, scan, of_face(truth) | more))
+        assert look.left_out["hair"] > 0
+        return look.filled.vertices[np.abs(look.filled.vertices[:, 2] - truth["op"][2]) < 25][:, 1].max()
+
+    place = truth["op"] + [0.0, 15.0, 0.0]
+    assert ends(op=place) == pytest.approx(place[1], abs=5.0)
+    assert ends(op=place) > ends() + 8
+
+
 def test_a_bald_head_is_kept_whole(reference):
     scan, _, truth = grown(reference, lambda points: 0.0)
     scan = surface_of(scan)

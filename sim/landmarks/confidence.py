@@ -48,18 +48,23 @@ def support(space: ShapeSpace, fit: ShapeFit) -> dict[str, float]:
 
 
 def judge(space: ShapeSpace, fit: ShapeFit, target: Surface, positions):
-    """Confidence {name: 0..1}, names in mid-air, names that are missing. What lies on a flat end, which is no skin, is
-    as good as in mid-air."""
+    """Confidence {name: 0..1}, names in mid-air (`in_mid_air`), names that are missing."""
     doubts, supports = doubt(space, fit), support(space, fit)
     names = list(positions)
     at = np.array([positions[n] for n in names])
-    off = (target.closest(at).distance > MID_AIR) | beyond(cuts_of(target), at)
+    off = in_mid_air(target, at)
     confidence = {n: (0.3 + 0.7 * min(1.0, 1.6 * supports[n])) / (1 + (doubts[n] / UNSURE) ** 2) for n in names}
     missing = tuple(n for n in names if doubts[n] > LOST and supports[n] < 0.1)
     mid_air = tuple(n for k, n in enumerate(names) if off[k] and n not in missing)
     for n in mid_air:
         confidence[n] *= 0.4
     return confidence, mid_air, missing
+
+
+def in_mid_air(target: Surface, places) -> np.ndarray:
+    """(k,) bool: which ``places`` (k, 3) mm hang where the scan shows nothing. What lies on a flat end, which is no skin, is
+    as good as in mid-air."""
+    return (target.closest(places).distance > MID_AIR) | beyond(cuts_of(target), places)
 
 
 def judge_together(positions, confidence, mid_air, rest, shown: Expression, like_ears) -> dict[str, float]:

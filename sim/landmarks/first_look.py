@@ -15,7 +15,7 @@ from ..adapt.thin_plate_spline import similarity
 from ..anatomy.head import Head
 from ..progress import Work
 from ..relax.mouth_gap import MARKS
-from .confidence import MID_AIR
+from .confidence import in_mid_air
 from .expression import fit_expression
 from .held_by_lips import held_by_lips
 from .hidden_skin import UNSEEN, hidden_skin, unseen_scalp, with_hidden_skin
@@ -79,9 +79,10 @@ def first_look(
     try:
         fit = yield from run(fit_shape(space, coarse, Pose(scale, matrix / scale, shift, 0.0)), 0.0, 0.6, LOOKING)
         fit, shown = yield from run(fit_expression(space, coarse, fit), 0.6, 0.9, LOOKING)
-        skull = {n: given[n] for n in names if n.partition("_")[0] in SKULL and n not in found}
-        skull = {n: p for n, p in skull.items() if coarse.closest(p[None]).distance[0] > MID_AIR * scale}
-        hair = yield from run(fit_under_hair(space, coarse, fit, shown, given, skull), 0.9, 1.0, LOOKING)
+        skull = [n for n in names if n.partition("_")[0] in SKULL and n not in found]
+        off = in_mid_air(target, np.reshape([given[n] for n in skull], (-1, 3)))
+        known = {n: given[n] for n in np.array(skull)[off]}
+        hair = yield from run(fit_under_hair(space, coarse, fit, shown, given, known), 0.9, 1.0, LOOKING)
     except NoFaceError:
         return FirstLook(given, target, target)
     landmarks = given | lids_told(space, fit, shown, coarse, given)

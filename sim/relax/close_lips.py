@@ -16,8 +16,8 @@ MEET = 200.0  # pull of a pair of points on each other
 #: Pull of lips toward where they were, as they get the reference's roundness back, and of skin this far from where they
 #: meet, mm: the scan shows how high the red is, but not the roundness of what was stretched.
 KEEP, KEPT, BEYOND = 0.003, 30.0, 9.0
-#: mm about a corner of the mouth in which folds are the expression's, farther off less and less of them; pull on the corner.
-FOLDS, CORNER = 22.0, 10.0
+FOLDS = 22.0  # mm about a corner of the mouth in which folds are the expression's, farther off less and less of them
+HELD = 10.0  # pull of a point that stays on where it was
 CORNERS = ("ch_l", "ch_r")
 
 
@@ -40,13 +40,8 @@ def lips_rounded(rest: Rest, skin, matrix) -> np.ndarray:
     matrix (3, 3) as in `lips_closed`; the lips keep meeting.
     """
     start = rest.head.skin.vertices
-    base = start @ matrix.T
-    apart, want = pairs_apart(rest, matrix)
     away = cKDTree(start[rest.lip_pairs.ravel()]).query(start)[0]
-    keep = KEEP * (KEPT / KEEP) ** np.clip(away / BEYOND, 0, 1)
-    system = rest.energy + diags(keep) + MEET * (apart.T @ apart)
-    right = keep[:, None] * (skin - base) + MEET * (apart.T @ (want - apart @ base))
-    return base + factorised(system)(right)
+    return smoothest(rest, skin, matrix, away / BEYOND)
 
 
 def corners_smoothed(rest: Rest, skin, matrix) -> np.ndarray:
@@ -56,14 +51,25 @@ def corners_smoothed(rest: Rest, skin, matrix) -> np.ndarray:
     to take it away. matrix (3, 3) as in `lips_closed`; lips keep meeting and corners stay where they are.
     """
     start = rest.head.skin.vertices
-    base = start @ matrix.T
-    apart, want = pairs_apart(rest, matrix)
     corners = landmark_rows(rest.head.landmarks, CORNERS, len(start))
     away = cKDTree(corners @ start).query(start)[0]
-    keep = KEEP * (KEPT / KEEP) ** np.clip(away / FOLDS, 0, 1)
-    system = rest.energy + diags(keep) + MEET * (apart.T @ apart) + CORNER * (corners.T @ corners)
+    return smoothest(rest, skin, matrix, away / FOLDS, corners)
+
+
+def smoothest(rest: Rest, skin, matrix, away, held=None) -> np.ndarray:
+    """Skin (n, 3) mm that differs as smoothly from the reference's as can be where it is free to; its lips meet.
+
+    matrix (3, 3) as in `lips_closed`; away (n,) : 0 where the skin is free, 1 and more where it stays; held (k, n) sparse :
+    rows that give points which stay anyway
+    """
+    base = rest.head.skin.vertices @ matrix.T
+    apart, want = pairs_apart(rest, matrix)
+    keep = KEEP * (KEPT / KEEP) ** np.clip(away, 0, 1)
+    system = rest.energy + diags(keep) + MEET * (apart.T @ apart)
     right = keep[:, None] * (skin - base) + MEET * (apart.T @ (want - apart @ base))
-    right += CORNER * (corners.T @ (corners @ (skin - base)))
+    if held is not None:
+        system = system + HELD * (held.T @ held)
+        right += HELD * (held.T @ (held @ (skin - base)))
     return base + factorised(system)(right)
 
 
