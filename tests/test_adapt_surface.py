@@ -15,11 +15,16 @@ def ball(radius=100.0, count=3000, seed=0):
     """Triangles of a sphere, outside out."""
     points = np.random.default_rng(seed).normal(size=(count, 3))
     points *= radius / np.linalg.norm(points, axis=1, keepdims=True)
+    return points, convex(points)
+
+
+def convex(points):
+    """Triangles of the convex hull about the origin, outside out."""
     faces = ConvexHull(points).simplices
     normal = np.cross(points[faces[:, 1]] - points[faces[:, 0]], points[faces[:, 2]] - points[faces[:, 0]])
     inward = (normal * points[faces].mean(axis=1)).sum(axis=1) < 0
     faces[inward] = faces[inward][:, ::-1]
-    return points, faces
+    return faces
 
 
 def test_closest_point_of_one_triangle():
@@ -67,6 +72,38 @@ def test_reach_limits_and_open_sides_are_told():
     np.testing.assert_allclose(found.normals[0], [0, 0, 1])
     turned = surface.turned().closest(np.array([[50.0, 50.0, 4.0]]))
     np.testing.assert_allclose(turned.normals[0], [0, 0, -1])
+
+
+def scanned_ball(radius=30.0, count=4000):
+    """A sphere's triangles about as even as a scanner's, its points along a spiral: sides of about 1.8 mm."""
+    z = 1 - (2 * np.arange(count) + 1) / count
+    turn = np.pi * (1 + 5**0.5) * np.arange(count)
+    points = radius * np.stack([*(np.sqrt(1 - z**2) * [np.cos(turn), np.sin(turn)]), z], axis=1)
+    return points, convex(points)
+
+
+@pytest.mark.parametrize("share", [0.05, 0.15, 0.3])
+def test_single_triangles_that_are_missing_end_no_data(share):
+    points, faces = scanned_ball()
+    there = np.random.default_rng(3).random(len(faces)) >= share
+    assert Surface(points, faces[there]).border_vertex.mean() < 0.005
+    up = points[faces][:, :, 2].min(axis=1) > 0
+    half, ragged = Surface(points, faces[up]), Surface(points, faces[up & there])
+    low = ragged.vertices[:, 2] < 8
+    assert ragged.border_vertex[~low].mean() < 0.005
+    assert ragged.border_vertex[low].sum() > 0.8 * half.border_vertex.sum()
+
+
+@pytest.mark.parametrize(("radius", "ends"), [(2.0, 0.0), (5.0, 0.9), (12.0, 0.95)])
+def test_a_hole_ends_data_if_it_is_wider_than_two_triangles(radius, ends):
+    points, faces = scanned_ball()
+    away = np.linalg.norm(points[faces].mean(axis=1) - [30.0, 0, 0], axis=1)
+    hole = Surface(points, faces[away > radius])
+    rim = np.linalg.norm(hole.vertices - [30.0, 0, 0], axis=1) < radius + 2.5
+    a, b, count = hole._sides
+    on_rim = np.unique(np.concatenate([a[count == 1], b[count == 1]]))
+    assert rim[on_rim].all()
+    assert ends <= hole.border_vertex[on_rim].mean() <= (1.0 if ends else 0.0)
 
 
 def test_rays_meet_the_sphere_twice():
@@ -147,11 +184,9 @@ def test_sampling_rejects_backs_borders_and_what_is_far():
 
 
 def test_islands_of_data_are_found():
-    points, faces = ball(count=4000)
-    centre = points[faces].mean(axis=1)
-    island = (np.linalg.norm(centre - [0, 0, 100.0], axis=1) > 3) & (
-        np.linalg.norm(centre - [0, 0, 100.0], axis=1) < 15
-    )
+    points, faces = scanned_ball(100.0, 16000)
+    away = np.linalg.norm(points[faces].mean(axis=1) - [0, 0, 100.0], axis=1)
+    island = (away > 5) & (away < 15)
     found, places = sampling_sites(
         np.array([[0, 0, 101.0]]), np.array([[0, 0, 1.0]]), Surface(points, faces[island]), np.full(1, 30.0)
     )

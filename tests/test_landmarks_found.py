@@ -13,7 +13,7 @@ from headshop.sim.landmarks.shape_fit import ShapeFit
 from headshop.sim.landmarks.shape_space import shape_space
 from headshop.sim.landmarks.verdict import Verdict, judged
 from headshop.sim.mesh import Mesh
-from headshop.sim.mesh_subdivision import drawn
+from headshop.sim.mesh_subdivision import drawn, smoother
 from headshop.sim.progress import Progress, finish
 from headshop.sim.scan.clean import clean_scan
 from headshop.sim.scan.individual import draw_field
@@ -59,6 +59,32 @@ def test_landmarks_of_a_turned_person_in_metres(person, reference):
             assert off[n] < np.linalg.norm(found.positions[n] - other)
     assert not found.missing
     assert np.mean([found.confidence[n] for n in FACE]) > 0.6
+
+
+@pytest.fixture(scope="module")
+def outside(person, reference):
+    """What a scanner sees of that person, with sides of 2 to 3 mm: (vertices, triangles)."""
+    rows, quads = smoother(reference.skin.faces, len(reference.skin.vertices), 2)
+    seen = (rows @ reference.groups["inner"] < 0.5)[quads].all(axis=1)
+    mesh = Mesh(rows @ person[0].vertices, quads[seen])
+    return mesh.vertices, mesh.triangles
+
+
+def test_a_face_is_found_though_single_triangles_are_missing_everywhere(person, outside, reference):
+    vertices, triangles = outside
+    there = np.random.default_rng(5).random(len(triangles)) > 0.1
+    found = finish(find_landmarks(Mesh.from_triangles(vertices, triangles[there]), reference))
+    assert np.mean([np.linalg.norm(found.positions[n] - person[1][n]) for n in FACE]) < 3.0
+    assert not found.missing and not {"prn", "en_l", "en_r", "sn", "gn"} & set(found.mid_air)
+
+
+def test_of_two_heads_beside_each_other_all_landmarks_are_on_one(person, outside, reference):
+    vertices, triangles = outside
+    other = vertices + [350.0, 5.0, 20.0]
+    both = np.concatenate([triangles, triangles + len(vertices)])
+    found = finish(find_landmarks(Mesh.from_triangles(np.concatenate([vertices, other]), both), reference))
+    shift = [350.0, 5.0, 20.0] if found.positions["prn"][0] > 175 else np.zeros(3)
+    assert max(np.linalg.norm(p - person[1][n] - shift) for n, p in found.positions.items()) < 25.0
 
 
 def test_what_a_damaged_scan_inside_out_does_not_show_is_in_mid_air_and_unsure(person, reference):

@@ -100,6 +100,13 @@ def test_a_face_with_nothing_in_its_mouth_is_kept_whole(reference, marks, face):
     assert look.target is whole and look.filled is whole and look.left_out["held_by_lips"] == 0
 
 
+def test_a_scan_that_is_inside_out_is_turned_before_anything_is_said_of_it(reference, marks, face):
+    vertices, triangles = face
+    look = finish(first_look(reference, Surface(vertices, triangles[:, ::-1], smooth=2.0), marks))
+    np.testing.assert_allclose(look.target.face_normals, Surface(*face).face_normals, atol=1e-12)
+    assert look.filled is look.target and look.left_out == {"held_by_lips": 0.0, "hair": 0.0}
+
+
 def test_who_wants_to_keep_it_does(reference, marks, scan):
     look = finish(first_look(reference, scan, marks, keep_held=True))
     assert look.target is scan and look.filled is scan and look.left_out["held_by_lips"] == 0

@@ -19,7 +19,7 @@ from headshop.sim.relax.bunching import fleshed
 from headshop.sim.relax.choice import kept_open, neutral_of, require_choice
 from headshop.sim.relax.close_lips import corners_smoothed
 from headshop.sim.relax.explain import explain
-from headshop.sim.relax.mouth_gap import first_and_last_edge, lip_edges
+from headshop.sim.relax.mouth_gap import bridged_depths, depths, first_and_last_edge, lip_edges
 from headshop.sim.relax.relaxed import relaxed
 from headshop.sim.relax.responses import MUSCLES, UNPAIRED, responses
 from headshop.sim.relax.smile import SMILE as LEAST
@@ -219,6 +219,26 @@ def test_edges_of_lips():
     assert first_and_last_edge(np.concatenate([lip, hole[:1], lip]), 2) is None  # a speck
     crease = np.concatenate([lip, [0.5, 1.5, 2.5, 1.5, 0.5], lip])
     assert first_and_last_edge(crease, 2) is None
+
+
+@pytest.mark.parametrize("inside", [False, True])
+def test_missing_triangles_are_no_gap_between_lips(inside):
+    """Nor do they show the inside of the mouth."""
+    side = np.arange(-30, 31.0)
+    x, z = np.meshgrid(side, side, indexing="ij")
+    sheet = np.stack([x, 0.02 * x**2, z], axis=-1).reshape(-1, 3)
+    i = np.arange(x.size).reshape(x.shape)
+    cells = np.stack([i[:-1, :-1], i[1:, :-1], i[1:, 1:], i[:-1, 1:]], axis=-1).reshape(-1, 4)
+    triangles = np.concatenate([cells[:, [0, 1, 2]], cells[:, [0, 2, 3]]])
+    slit = (np.abs(sheet[triangles][:, :, 2]) < 4).any(axis=1)
+    there = np.random.default_rng(4).random(len(triangles)) > 0.15
+    scan, forward = Surface(sheet, triangles[there & ~slit]), np.array([0, -1.0, 0])
+    scan = scan.beside(sheet + [0, 12.0, 0], triangles) if inside else scan
+    rays = np.random.default_rng(5).uniform([-20, -5, -20], [20, -5, 20], (2000, 3))
+    found, plain = (see(scan, rays, forward) - 5 - 0.02 * rays[:, 0] ** 2 for see in (bridged_depths, depths))
+    over, between = np.abs(rays[:, 2]) > 5.5, np.abs(rays[:, 2]) < 2.5
+    assert (np.abs(found[over]) < 0.5).mean() > 0.98 > 0.9 > (np.abs(plain[over]) < 0.5).mean()
+    np.testing.assert_allclose(found[between], 12.0 if inside else np.nan, atol=0.1)
 
 
 def test_the_mouths_inside_is_no_lip():

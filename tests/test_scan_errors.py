@@ -69,6 +69,7 @@ def test_each_fault_is_removed_and_counted():
         "welded_vertices": 1,
         "zero_area_faces": 2,
         "duplicate_faces": 2,
+        "turned_faces": 0,
         "unused_vertices": 2,  # the lone point and the middle of the line
         "vertices": n + 3,
         "triangles": len(triangles) + 1,
@@ -78,6 +79,16 @@ def test_each_fault_is_removed_and_counted():
     seam = np.flatnonzero((mesh.vertices == points[7]).all(axis=1))
     np.testing.assert_allclose(mesh.colour[seam], [[0.625] * 3])
     assert np.delete(mesh.colour, seam, axis=0).max() == 0.5
+
+
+def test_triangles_wound_the_other_way_than_their_neighbours_are_turned():
+    points, triangles = _dome()
+    wrong = np.random.default_rng(2).random(len(triangles)) < 0.3
+    mixed = np.where(wrong[:, None], triangles[:, ::-1], triangles)
+    mesh, counts = clean_scan(Mesh.from_triangles(points, mixed))
+    assert counts["turned_faces"] == wrong.sum()
+    a, b, c = mesh.vertices[mesh.triangles].transpose(1, 0, 2)
+    assert (np.cross(b - a, c - a)[:, 2] > 0).all()
 
 
 def test_triangles_that_share_no_vertex_are_welded():

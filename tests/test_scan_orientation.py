@@ -6,7 +6,7 @@ import pytest
 
 from headshop.sim.errors import InputError
 from headshop.sim.mesh import Mesh
-from headshop.sim.scan.orientation import UNITS, detect, rotations
+from headshop.sim.scan.orientation import UNITS, detect, plausible_units, rotations
 from headshop.sim.scan.ply import read_ply
 
 
@@ -95,6 +95,16 @@ def test_a_ball_is_no_face_and_it_says_so(reference):
 def test_wrong_overrides(reference, skin, options, says):
     with pytest.raises(InputError, match=says):
         detect(skin, **options)
+
+
+def test_somebody_from_head_to_foot_is_in_metres(skin):
+    points, low = skin.vertices / 1000, skin.vertices.min(axis=0) / 1000
+    feet = low + [[0, 0, -1.4], [0.1, 0, -1.4], [0.0, 0.1, -1.4]]
+    mesh = Mesh.from_triangles(
+        np.concatenate([points, feet]), np.concatenate([skin.triangles, [[len(points) + k for k in range(3)]]])
+    )
+    assert plausible_units(mesh) == {"m": 1000.0}
+    assert plausible_units(skin) == {"mm": 1.0}
 
 
 def test_absurd_size(reference, skin):

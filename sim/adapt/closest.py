@@ -11,17 +11,20 @@ from functools import cached_property
 import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
 from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 from ..box_tree import BoxTree
 from ..mesh import cross_sides, vertex_normals
 from ..triangle_projection import Triangles
 from .cover import Cover
 from .merging import clustered, weld
+from .open_ends import data_ends
 from .ranking import Ranking, least
 
 FIRST = 8  # nearest samples of a point that are looked at before it is known how many more must be
 BATCH = 20_000  # points looked at together
 FEW = 10_000  # sides that tell how long they are in the median
+SAME = 1e-3  # mm: vertices as near as that are one
 ENOUGH = 300_000  # triangles that show all of a head that a mesh of some thousand vertices can follow
 
 
@@ -60,6 +63,7 @@ class Surface:
     def __init__(self, vertices, triangles, smooth: float = 0.0):
         self.vertices, self.triangles = weld(np.asarray(vertices, dtype=float), np.asarray(triangles))
         self._smooth = smooth
+        self._parts: tuple[Surface, ...] = ()
         self._planes = self.vertices.T.copy()
         cross = cross_sides(*(self._planes.take(self.triangles[:, k], axis=1) for k in range(3)))
         self._double = np.sqrt(cross[0] ** 2 + cross[1] ** 2 + cross[2] ** 2)
@@ -111,12 +115,33 @@ class Surface:
         return float(np.median(np.linalg.norm(self.vertices[a[some]] - self.vertices[b[some]], axis=1)))
 
     @cached_property
-    def border_vertex(self) -> np.ndarray:
-        """(n,) bool: vertices on open sides."""
+    def _open(self) -> np.ndarray:
+        """(k, 2) vertices of the open sides."""
         a, b, count = self._sides
+        return np.stack([a[count == 1], b[count == 1]], axis=1)
+
+    @cached_property
+    def border_vertex(self) -> np.ndarray:
+        """(n,) bool: vertices on open sides where data ends."""
+        if self._parts:  # each ends where it did
+            ends = np.concatenate([part.vertices[part.border_vertex] for part in self._parts])
+            rim = np.unique(self._open)
+            out = np.zeros(len(self.vertices), dtype=bool)
+            out[rim] = cKDTree(ends).query(self.vertices[rim])[0] < SAME if len(ends) else False
+            return out
+
+        def nearest(points):
+            owner = self.cover.owner[self.cover.nearest(points, 1, np.inf)[1][:, 0]]
+            return self.solid.closest(points, np.arange(len(points)), owner)[1]
+
+        return data_ends(self.vertices, self.triangles, self._open, nearest)
+
+    @cached_property
+    def gap_vertex(self) -> np.ndarray:
+        """(n,) bool: vertices on open sides beyond which data goes on."""
         out = np.zeros(len(self.vertices), dtype=bool)
-        out[a[count == 1]] = out[b[count == 1]] = True
-        return out
+        out[self._open] = True
+        return out & ~self.border_vertex
 
     @cached_property
     def _link(self):
@@ -155,13 +180,16 @@ class Surface:
             "vertices",
             "_planes",
             "_smooth",
+            "_parts",
             "_double",
             "cover",
             "_boxes",
             "_upper",
             "_sides",
             "edge_length",
+            "_open",
             "border_vertex",
+            "gap_vertex",
             "_link",
             "piece_area",
         )
@@ -176,7 +204,9 @@ class Surface:
     def beside(self, vertices, triangles) -> "Surface":
         """This surface and another one, ``vertices`` (k, 3) mm and ``triangles`` (t, 3), as one."""
         both = np.concatenate([self.triangles, triangles + len(self.vertices)])
-        return Surface(np.concatenate([self.vertices, vertices]), both, self._smooth)
+        out = Surface(np.concatenate([self.vertices, vertices]), both, self._smooth)
+        out._parts = (self, Surface(vertices, triangles, self._smooth))
+        return out
 
     def coarser(self, most: int = ENOUGH) -> "Surface":
         """This surface with about ``most`` triangles, by merging vertices that are closest; itself where it has no more.

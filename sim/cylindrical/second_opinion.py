@@ -18,6 +18,9 @@ SHARP_MARKS = {"prn", "ls", "sto", "or_l", "or_r", "obi_l", "obi_r"}
 DULL_MARKS = {"gn", "v", "op", "sa_l", "sa_r", "al_l", "al_r"}
 #: How sure a landmark must be to say where the face is; mm within which the mean is put back on the surface.
 TOLD, NEAR = 0.3, 4.0
+ASTRAY = (
+    25.0  # mm on a head of the reference's size: a feature farther off is that of something else, another head for one
+)
 
 
 def weighed(
@@ -38,8 +41,8 @@ def weighed(
     out = {}
     for name, place in positions.items():
         share = SHARP if name in SHARP_MARKS else DULL if name in DULL_MARKS else USUAL
-        other = features.positions.get(name, place)
-        out[name] = place + share * (other - place)
+        off = features.positions.get(name, place) - place
+        out[name] = place + share * off if np.linalg.norm(off) < ASTRAY * scale else place
     names = list(out)
     before = surface.closest(np.array([positions[n] for n in names]), NEAR)
     after = surface.closest(np.array([out[n] for n in names]), NEAR)

@@ -20,7 +20,7 @@ from .expression import fit_expression
 from .held_by_lips import held_by_lips
 from .hidden_skin import UNSEEN, hidden_skin, unseen_scalp, with_hidden_skin
 from .lids_told import lids_told
-from .placed_face import run
+from .placed_face import facing_out, run
 from .pose_search import Pose
 from .shape_fit import NoFaceError, fit_shape
 from .shape_space import shape_space
@@ -73,11 +73,14 @@ def first_look(
     names = [name for name in given if name in rest]
     if len(names) < FEWEST:
         return FirstLook(given, target, target)
-    space, coarse = shape_space(reference), target.coarser()
+    space = shape_space(reference)
     matrix, shift = similarity([rest[name] for name in names], [given[name] for name in names])
     scale = np.cbrt(np.linalg.det(matrix))
+    pose = Pose(scale, matrix / scale, shift, 0.0)
+    target = facing_out(space, target, pose)
+    coarse = target.coarser()
     try:
-        fit = yield from run(fit_shape(space, coarse, Pose(scale, matrix / scale, shift, 0.0)), 0.0, 0.6, LOOKING)
+        fit = yield from run(fit_shape(space, coarse, pose), 0.0, 0.6, LOOKING)
         fit, shown = yield from run(fit_expression(space, coarse, fit), 0.6, 0.9, LOOKING)
         skull = [n for n in names if n.partition("_")[0] in SKULL and n not in found]
         off = in_mid_air(target, np.reshape([given[n] for n in skull], (-1, 3)))

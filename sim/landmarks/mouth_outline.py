@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..adapt.closest import Surface
-from ..relax.mouth_gap import SPECK, STEP, depths
+from ..relax.mouth_gap import SPECK, STEP, bridged_depths
 from ..relax.parted import APART
 from ..relax.smile import CORNERS
 
@@ -68,7 +68,7 @@ def looked_at(target: Surface, marks, forward, scale: float):
     arch, up = mouth_arch(marks, "ls", forward, aside)
     above = np.arange(scale * ABOVE, (marks["pg"] - marks["ls"]) @ up, -scale * DOWN)
     places = arch[:, None] + above[:, None] * up
-    depth = depths(target, places.reshape(-1, 3), forward).reshape(places.shape[:2])
+    depth = bridged_depths(target, places.reshape(-1, 3), forward).reshape(places.shape[:2])
     return places, depth / scale
 
 

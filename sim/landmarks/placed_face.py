@@ -99,13 +99,13 @@ def _trials(look, few, mesh, samples, template, scale) -> Work:
     trials = []
     for k, pose in enumerate(poses):
         pose = replace(pose, scale=pose.scale * look.size)
-        facing = _facing(few, target, pose)
+        outward = facing_out(few, target, pose)
         part = (0.5 + 0.5 * (k + extra) / len(poses) for extra in (0, 1))
         try:
-            fit = yield from run(fit_shape(few, facing, pose, TRIAL, every=3), *part, LOOKING)
+            fit = yield from run(fit_shape(few, outward, pose, TRIAL, every=3), *part, LOOKING)
         except NoFaceError:
             continue
-        trials.append((misfit_of(few, fit), scale, fit, facing))
+        trials.append((misfit_of(few, fit), scale, fit, outward))
     return trials
 
 
@@ -165,8 +165,8 @@ def _lies(space, fit) -> Pose:
     return Pose(size, matrix / size, shift, fit.pose.misfit)
 
 
-def _facing(space, target, pose):
-    """The scan turned inside out if its normals face away from those of a skin at ``pose``."""
+def facing_out(space: ShapeSpace, target: Surface, pose: Pose) -> Surface:
+    """The scan ``target``, turned inside out if its normals face away from those of a skin at ``pose``."""
     points = pose.scale * space.points @ pose.turn.T + pose.shift
     face = space.face > 0.5
     found = target.closest(points[face], 15.0)

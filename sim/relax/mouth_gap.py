@@ -6,6 +6,7 @@ most a crack of missing data.
 """
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from ..adapt.closest import Surface
 
@@ -17,6 +18,9 @@ SPECK = 1.2  # mm: a hole no longer than this, with data as deep on both sides, 
 LIP = 8.0  # mm: what lies deeper than this behind the line from lip to lip is no lip
 ROUGH = 1.0  # mm by which an edge usually strays from a smooth line
 FEWEST = 10  # edges that make a lip
+#: Sides of the scan's triangles: how far beside a gap it is asked how deep it lies, and how near the scan must be; of how many
+#: places.
+BRIDGED, ABOUT = 1.0, 6
 MIDDLE = 0.3  # shares of the way to the corner up to here tell how wide the mouth is open
 
 
@@ -52,7 +56,7 @@ def profiles(target: Surface, given, forward, shares):
     corner = np.where(shares[:, None] > 0, given["ch_l"], given["ch_r"])
     upper, lower = (given[name] + aside * (corner - given[name]) for name in ("ls", "li"))
     lines = upper[:, None] + np.linspace(0, 1, STEPS)[:, None] * (lower - upper)[:, None]
-    return lines, depths(target, lines.reshape(-1, 3), forward).reshape(len(shares), STEPS)
+    return lines, bridged_depths(target, lines.reshape(-1, 3), forward).reshape(len(shares), STEPS)
 
 
 def smoothed(edges, shares, at) -> np.ndarray:
@@ -91,6 +95,25 @@ def depths(target: Surface, points, forward) -> np.ndarray:
     out = np.full(len(points), np.nan)
     order = np.argsort(along, kind="stable")
     out[line[order]] = -along[order]  # the last one written lies farthest out
+    return out
+
+
+def bridged_depths(target: Surface, points, forward) -> np.ndarray:
+    """(k,) as `depths`, but where the scan lacks single triangles, and so nothing or the inside of the mouth is seen, it is as
+    deep as beside them."""
+    out = depths(target, points, forward)
+    there = np.isfinite(out)
+    if not target.gap_vertex.any() or not there.any():
+        return out
+    reach = BRIDGED * target.edge_length
+    along = points @ forward
+    across = points - along[:, None] * forward
+    _, near = cKDTree(across[there]).query(across, min(ABOUT, there.sum()), distance_upper_bound=reach)
+    level = np.append((along - out)[there], -np.inf)[near].reshape(len(points), -1).max(axis=1)  # outermost beside
+    lost = np.flatnonzero(np.isfinite(level) & (~there | (along - out < level - STEP)))
+    found = target.closest(across[lost] + level[lost, None] * forward, reach)
+    on = found.found & ~found.border & target.gap_vertex[target.triangles[found.triangle]].any(axis=1)
+    out[lost[on]] = along[lost[on]] - found.points[on] @ forward
     return out
 
 

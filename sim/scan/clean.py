@@ -10,6 +10,7 @@ from scipy.sparse.csgraph import connected_components
 from ..errors import InputError
 from ..mesh import Mesh, cross_sides
 from ..progress import Progress, Work, finish
+from .winding import wound_alike
 
 #: Fewer triangles than this are no head.
 FEWEST_TRIANGLES = 100
@@ -25,11 +26,12 @@ def clean_scan(mesh: Mesh) -> tuple[Mesh, dict]:
 
 
 def cleaning(mesh: Mesh) -> Work:
-    """Work returning a triangle mesh without NaN vertices, zero-area, duplicate faces and unused vertices; equal ones welded.
+    """Work returning a triangle mesh without NaN vertices, zero-area, duplicate faces and unused vertices; equal ones welded,
+    neighbours wound the same way round.
 
     It returns the mesh (colours kept: the mean of those welded) and counts: ``vertices``, ``triangles``, ``components`` of
-    the result, and what was removed: ``nonfinite_vertices``, ``nonfinite_faces``, ``welded_vertices``,
-    ``zero_area_faces``, ``duplicate_faces``, ``unused_vertices``.
+    the result, what was removed: ``nonfinite_vertices``, ``nonfinite_faces``, ``welded_vertices``,
+    ``zero_area_faces``, ``duplicate_faces``, ``unused_vertices``, and the ``turned_faces``.
 
     Raises
     ------
@@ -84,6 +86,9 @@ def cleaning(mesh: Mesh) -> Work:
             f"Only {len(triangles)} usable triangles are left of the scan, too few for a head: choose another file."
         )
     _refuse_flat(points)
+    turned = wound_alike(triangles, len(points))
+    counts["turned_faces"] = int(turned.sum())
+    triangles[turned] = triangles[turned, ::-1]
     yield Progress(0.9, "Cleaning the scan")
     counts |= {
         "vertices": len(points),

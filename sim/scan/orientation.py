@@ -16,6 +16,7 @@ UNITS = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
 
 #: Largest extent of a scan of a face patch (the smallest) and of a bust (the largest), mm.
 PLAUSIBLE = (90.0, 900.0)
+BODY = 2600.0  # mm, the same of somebody from head to foot: taken for that only if no unit makes a head of it
 
 AXES = {sign + name: s * np.eye(3)[k] for k, name in enumerate("XYZ") for sign, s in (("+", 1.0), ("-", -1.0))}
 
@@ -179,7 +180,9 @@ def _units(points, unit) -> list[tuple[str, float]]:
             raise InputError(f"{unit!r} is no unit: give mm, cm, m, in, or millimetres per unit as a number.")
         return [("custom", scale)]
     extent = np.ptp(points, axis=0).max()
-    units = [(name, scale) for name, scale in UNITS.items() if PLAUSIBLE[0] <= extent * scale <= PLAUSIBLE[1]]
+    least, most = PLAUSIBLE
+    units = [(name, scale) for name, scale in UNITS.items() if least <= extent * scale <= most]
+    units = units or [(name, scale) for name, scale in UNITS.items() if most < extent * scale <= BODY]
     if not units:
         raise InputError(
             f"The scan is {extent:.4g} units across, which is no head in mm, cm, m or inches: give the unit, as a name "
