@@ -6,7 +6,7 @@ import pytest
 
 from headshop.sim.adapt.landmarks import read_landmarks
 from headshop.sim.anatomy.landmark_names import SKIN, mirrored
-from headshop.sim.landmarks import placed_face
+from headshop.sim.landmarks import placed_face, verdict
 from headshop.sim.landmarks.find import find_landmarks
 from headshop.sim.landmarks.pose_search import Pose
 from headshop.sim.landmarks.shape_fit import ShapeFit
@@ -142,6 +142,37 @@ def test_of_two_places_a_face_fits_as_well_the_likelier_shape_is_better(referenc
     usual, odd = bad(np.full(m, 0.5)), bad(np.full(m, 1.5))
     assert usual.likeness == odd.likeness and not usual.doubtful and not odd.doubtful
     assert odd.bad > 2 * usual.bad
+
+
+@pytest.mark.parametrize(
+    "misfit, likeness, spread, face",
+    [
+        (1.0, 0.96, 0.5, True),
+        (1.3, 0.67, 0.6, True),  # hair down to the brows
+        (3.0, 0.77, 1.2, False),
+        (2.5, 0.77, 1.3, True),  # cut off, and with a tube in the mouth
+        (2.5, 0.70, 1.3, False),  # a bumpy ball
+        (2.0, 0.6, 0.8, False),  # a neck
+        (2.5, 0.74, 2.0, False),  # a tiny face on a nose
+        (3.9, 0.98, 0.3, True),  # nothing but eyes, nose and mouth
+        (5.5, 0.98, 0.3, False),
+        (1.0, 0.5, 0.1, False),
+    ],
+)
+def test_what_is_taken_for_a_face(reference, monkeypatch, misfit, likeness, spread, face):
+    monkeypatch.setattr(verdict, "misfit_of", lambda *_: misfit)
+    monkeypatch.setattr(verdict, "likeness_of", lambda *_: likeness)
+    fit = ShapeFit(None, np.full(10, spread), None, None, None, None)
+    assert judged(reference, None, fit, 0.53).doubtful != face
+
+
+def test_a_crop_from_brows_to_lips_is_a_face(person, outside, reference):
+    vertices, triangles = outside
+    near = np.linalg.norm(vertices[triangles].mean(axis=1) - person[1]["sn"], axis=1) < 66
+    found = finish(find_landmarks(Mesh.from_triangles(vertices, triangles[near]), reference))
+    marks = [n for n in FACE if n.partition("_")[0] in ("prn", "sn", "al", "en", "ls", "sto", "ch", "n")]
+    assert np.mean([np.linalg.norm(found.positions[n] - person[1][n]) for n in marks]) < 2.5
+    assert {"op", "v", "t_l", "t_r", "go_l"} <= set(found.mid_air) | set(found.missing)
 
 
 @pytest.mark.parametrize(

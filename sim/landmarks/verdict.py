@@ -11,6 +11,12 @@ from .shape_fit import ShapeFit
 from .shape_space import ShapeSpace
 
 POOR = 2.6  # mm on a head of the reference's size: a mean distance in the face above which there is none
+#: The same where the scan has as much relief of a face as no other thing has: it shows little of one, but that plainly.
+SURE, LITTLE = 0.9, 5.0
+#: How bad a fit is, above which the relief must be more like a face than chance finds one, and above which there is none. Faces
+#: are up to 6 bad, one cut off below and above with a tube in its mouth 12 with a likeness of .76; necks, sides of heads and
+#: bumpy balls 8 to 18 with up to .70, and tiny faces on parts of a true one 22 with .74.
+ODD, PLAINLY, NONE = 7.0, 0.72, 15.0
 
 
 class Verdict(NamedTuple):
@@ -29,7 +35,9 @@ def judged(reference: Head, space: ShapeSpace, fit: ShapeFit, relief: float) -> 
     """
     misfit, likeness = misfit_of(space, fit), likeness_of(reference, space, fit)
     bad = misfit / max(likeness, 0.1) ** 2 * (1 + np.mean(fit.coefficients**2))
-    return Verdict(misfit > POOR or likeness < relief, float(bad), likeness)
+    most = LITTLE if likeness > SURE else POOR
+    enough = max(relief, PLAINLY) if bad > ODD else relief
+    return Verdict(misfit > most or likeness < enough or bad > NONE, float(bad), likeness)
 
 
 def likeness_of(reference: Head, space: ShapeSpace, fit: ShapeFit) -> float:
