@@ -60,7 +60,7 @@ def parser() -> argparse.ArgumentParser:
     build.add_argument("--name", help="what to call the head (default: the scan's name)")
     relax = "make the face neutral: auto (where the lips are parted; the default), always or never"
     build.add_argument("--relax", choices=RELAX, default="auto", metavar="WHEN", help=relax)
-    leave = "leave out what is no skin: auto (flat ends, what the lips hold, hair; the default) or never"
+    leave = "leave out what is no skin: auto (jumps of a depth map, flat ends, what the lips hold, hair; the default) or never"
     build.add_argument("--leave-out", choices=LEAVE_OUT, default="auto", metavar="WHEN", help=leave)
     build.add_argument("-o", "--output", required=True, metavar="HEAD.blend")
 

@@ -57,7 +57,7 @@ LEAVE_OUT = (
     (
         "AUTO",
         "What Is No Skin",
-        "Leave out flat ends of the scan, hair, and what the lips hold, such as a breathing tube",
+        "Leave out jumps of a depth map, flat ends of the scan, hair, and what the lips hold, such as a breathing tube",
     ),
     ("NEVER", "Nothing", "Take all of the scan for skin"),
 )

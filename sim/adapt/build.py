@@ -22,7 +22,7 @@ from .follow import follow
 from .gate import check_against_scan, check_arrangement, check_likeness, check_on_surface
 from .landmarks import require_usable
 from .rest import BONES, rest_of
-from .scan_surface import near_head, require_leaving, without_cuts
+from .scan_surface import near_head, require_leaving, without_cuts, without_jumps
 from .skin_fit import SkinFit, fit_skin
 from .skin_groups import group
 from .vestibules import vestibules
@@ -73,7 +73,8 @@ def build_head(
     detail : texels along a side of the detail maps; 0 for none
     relax : ``auto`` makes a face neutral whose lips are parted (`sim.relax`), ``always`` any, ``never`` none. The figures
         in ``fit`` are those of the face as scanned.
-    leave_out : ``auto`` leaves out of the scan what is no skin, flat ends, what the lips hold and hair, ``never`` nothing
+    leave_out : ``auto`` leaves out of the scan what is no skin, jumps of a depth map, flat ends, what the lips hold and hair,
+        ``never`` nothing
     found : names of the landmarks that nobody picked: the skin is held to them more loosely
 
     Raises
@@ -88,7 +89,8 @@ def build_head(
     require_leaving(leave_out)
     yield Progress(0.0, "Looking at the scan")
     whole = near_head(reference, scan, given)
-    target = whole if leave_out == "never" else without_cuts(whole)
+    smooth = whole if leave_out == "never" else without_jumps(whole)
+    target = whole if leave_out == "never" else without_cuts(smooth)
     yield Progress(0.05, "Judging the landmarks")
     check_against_scan(given, target)
     check_arrangement(reference.landmark_positions(), given)
@@ -110,7 +112,8 @@ def build_head(
     scanned = head.skin.vertices + (fit.cage - skin)
     report = fit_report(reference, fit, given, scanned)
     report["invented"] = invented(fitted_shares(head, fit.fitted.fitted))
-    report["left_out_mm2"] = {"flat_ends": float(whole.area.sum() - target.area.sum())} | look.left_out
+    jumps, ends = -np.diff([each.area.sum() for each in (whole, smooth, target)])
+    report["left_out_mm2"] = {"depth_jumps": float(jumps), "flat_ends": float(ends)} | look.left_out
     report["sentence"] = fit_sentence(report, report["invented"])
     if neutral is not None and relax == "never":
         head, neutral = kept_open(fit.lips_closed, head, scanned, neutral.jaw), None

@@ -18,7 +18,12 @@ REGIONS = {
     "neck": ("neck",),
 }
 #: Key of what was left out of the scan -> what is said of it.
-LEFT_OUT = {"flat_ends": "a flat end", "held_by_lips": "what the lips hold", "hair": "hair"}
+LEFT_OUT = {
+    "depth_jumps": "what is stretched over the jumps of a depth map",
+    "flat_ends": "a flat end",
+    "held_by_lips": "what the lips hold",
+    "hair": "hair",
+}
 SIDED = ("eyelids", "cheek", "ear")
 FITTED = 0.3  # a vertex counts as fitted from here on
 MOST, ALL = 0.4, 0.1  # share of a region that was fitted, below which it counts as invented for the most part, wholly

@@ -6,6 +6,7 @@ import numpy as np
 from ..anatomy.head import Head
 from ..errors import InputError
 from ..mesh import Mesh
+from ..scan.depth_jumps import depth_jumps
 from ..scan.flat_cuts import beyond, flat_cuts
 from .closest import Surface
 from .thin_plate_spline import similarity
@@ -24,8 +25,8 @@ def require_leaving(choice: str) -> None:
 
 
 def scan_surface(reference: Head, scan: Mesh, given: dict[str, np.ndarray], most: int = MOST) -> Surface:
-    """The surface of ``scan`` (mm, any place) that the reference is fitted to: `near_head` `without_cuts`."""
-    return without_cuts(near_head(reference, scan, given, most))
+    """The surface of ``scan`` (mm, any place) that the reference is fitted to: `near_head` without jumps and cuts."""
+    return without_cuts(without_jumps(near_head(reference, scan, given, most)))
 
 
 def near_head(reference: Head, scan: Mesh, given: dict[str, np.ndarray], most: int = MOST) -> Surface:
@@ -51,6 +52,11 @@ def near_head(reference: Head, scan: Mesh, given: dict[str, np.ndarray], most: i
 def without_cuts(surface: Surface) -> Surface:
     """``surface`` without its flat ends (`flat_cuts`): there it stops, and what lies beyond is to be invented."""
     return surface.without(beyond(cuts_of(surface), surface.vertices)[surface.triangles].any(axis=1))
+
+
+def without_jumps(surface: Surface) -> Surface:
+    """``surface`` without what a depth map has stretched over its jumps (`depth_jumps`)."""
+    return surface.without(depth_jumps(surface.vertices, surface.triangles))
 
 
 def cuts_of(surface: Surface) -> np.ndarray:

@@ -10,6 +10,7 @@ from ..anatomy.storage import load_head
 from ..cylindrical.second_opinion import weighed
 from ..mesh import Mesh
 from ..progress import Progress, Work, portion
+from ..scan.depth_jumps import depth_jumps
 from .confidence import judge, judge_together, like_ears, sure_as_corners
 from .expression import fit_expression, line_of, meeting_lids, outline_of
 from .picked import picked
@@ -68,6 +69,8 @@ def find_landmarks(mesh: Mesh, reference: Head | None = None, unit_scales=(1.0,)
     yield Progress(0.0, LOOKING)
     reference = reference or load_head()
     space = shape_space(reference)
+    jumps = depth_jumps(mesh.vertices, mesh.triangles)
+    mesh = Mesh.from_triangles(mesh.vertices, mesh.triangles[~jumps]) if jumps.any() else mesh
     yield Progress(0.05, LOOKING)
     scale, fit, target = yield from portion(place_face(mesh, reference, space, unit_scales), 0.05, 0.8)
     misfit = misfit_of(space, fit)
