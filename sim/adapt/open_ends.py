@@ -53,9 +53,8 @@ def outward(vertices, around, rim):
         np.stack([np.bincount(corner, each[:, k], n)[rim] for k in range(3)], axis=1)
         for each in (np.tile(cross, (3, 1)), offset)
     )
-    side = (
-        np.sqrt(3) * np.bincount(corner, np.linalg.norm(offset, axis=1), n)[rim] / np.bincount(corner, minlength=n)[rim]
-    )
+    count = np.bincount(corner, minlength=n)[rim]
+    side = np.sqrt(3) * np.bincount(corner, np.linalg.norm(offset, axis=1), n)[rim] / count
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
     way -= normal * np.einsum("ij,ij->i", way, normal)[:, None]
     return way / np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-12), side

@@ -18,9 +18,8 @@ SHARP_MARKS = {"prn", "ls", "sto", "or_l", "or_r", "obi_l", "obi_r"}
 DULL_MARKS = {"gn", "v", "op", "sa_l", "sa_r", "al_l", "al_r"}
 #: How sure a landmark must be to say where the face is; mm within which the mean is put back on the surface.
 TOLD, NEAR = 0.3, 4.0
-ASTRAY = (
-    25.0  # mm on a head of the reference's size: a feature farther off is that of something else, another head for one
-)
+#: mm on a head of the reference's size: a feature farther off is that of something else, another head for one.
+ASTRAY = 25.0
 
 
 def weighed(
