@@ -101,7 +101,9 @@ def own_errors(vertices, triangles, subject, scan: Surface):
 def off(points, scan: Surface):
     """How far points (k, 3) mm that have data lie from the scan: the part of a row that tells of the surface."""
     found = scan.closest(points, REACH)
-    near = found.distance[found.found & ~found.border]
+    # Narrow gaps are holes here as well: no fit is to be the better for what it takes them for.
+    on_open = (scan.border_vertex | scan.gap_vertex)[scan.triangles[found.triangle]] & (found.weights > 1e-6)
+    near = found.distance[found.found & ~on_open.any(axis=1)]
     return {"mean_mm": float(near.mean()), "p95_mm": float(np.percentile(near, 95)), "max_mm": float(near.max())}
 
 
