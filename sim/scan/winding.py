@@ -6,11 +6,11 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 
-def wound_alike(triangles: np.ndarray, vertex_count: int, area: np.ndarray | None = None) -> np.ndarray:
+def wound_alike(triangles: np.ndarray, vertex_count: int) -> np.ndarray:
     """(m,) bool: which of the triangles (m, 3) to turn over so that all of a piece are wound alike.
 
-    Of each piece that hangs together by sides of two triangles the lesser part is turned, by ``area`` (m,), or by count if
-    None; one that cannot be wound alike (a Möbius strip) stays as it is. Which side is out, this does not tell.
+    Of each piece that hangs together by sides of two triangles the fewer are turned; one that cannot be wound alike (a Möbius
+    strip) stays as it is. Which side is out, this does not tell.
     """
     m = len(triangles)
     turn = np.zeros(m, dtype=bool)
@@ -23,9 +23,8 @@ def wound_alike(triangles: np.ndarray, vertex_count: int, area: np.ndarray | Non
     label = connected_components(links, directed=False)[1]
     as_is, over = label[:m], label[m:]
     piece, second = np.minimum(as_is, over), as_is > over
-    weight = np.ones(m) if area is None else area
-    first_area, second_area = (np.bincount(piece[some], weight[some], 2 * m) for some in (~second, second))
-    return (as_is != over) & (second == (second_area < first_area)[piece])
+    one_way, other_way = (np.bincount(piece[some], minlength=2 * m) for some in (~second, second))
+    return (as_is != over) & (second == (other_way < one_way)[piece])
 
 
 def _neighbours(triangles, n):
