@@ -16,7 +16,6 @@ from ..sim.errors import InputError
 
 INTERRUPTED = 130
 RELAX = ("auto", "always", "never")
-LEAVE_OUT = ("auto", "never")
 SETS = ("muscles", "facs", "arkit", "expressions", "rig")
 
 
@@ -60,8 +59,9 @@ def parser() -> argparse.ArgumentParser:
     build.add_argument("--name", help="what to call the head (default: the scan's name)")
     relax = "make the face neutral: auto (where the lips are parted; the default), always or never"
     build.add_argument("--relax", choices=RELAX, default="auto", metavar="WHEN", help=relax)
-    leave = "leave out what is no skin: auto (jumps of a depth map, flat ends, what the lips hold, hair; the default) or never"
-    build.add_argument("--leave-out", choices=LEAVE_OUT, default="auto", metavar="WHEN", help=leave)
+    leave = "what to leave out as no skin: auto (all of it; the default), never, or of these, with commas between: "
+    leave += "depth_jumps, flat_ends, held_by_lips, hair"
+    build.add_argument("--leave-out", default="auto", metavar="WHAT", help=leave)
     build.add_argument("-o", "--output", required=True, metavar="HEAD.blend")
 
     landmarks = command("landmarks", "Find the landmarks of a scan.", reading)

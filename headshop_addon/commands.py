@@ -27,9 +27,11 @@ def version() -> None:
 def build(options) -> None:
     """A scan, and landmarks if there are, to a head in a .blend, with plain files if asked for."""
     from ..sim.adapt.landmarks import read_landmark_file
+    from ..sim.adapt.scan_surface import to_leave_out
 
     _require_file(options.scan, "scan")
     _require_kind(options.output, _BLEND)
+    to_leave_out(options.leave_out)
     landmarks = None if options.landmarks is None else read_landmark_file(options.landmarks)
     with Outputs() as outputs:
         blend = outputs.file(options.output)

@@ -121,7 +121,7 @@ def build(
 
     ``landmarks`` are in the scan's place (mm); ``detail`` is the side of the detail maps in pixels, 0 for none.
     ``relax`` is one of `sim.relax.choice.CHOICES`; a face that is relaxed keeps itself as scanned in a shape key.
-    ``leave_out`` is one of `sim.adapt.scan_surface.CHOICES`; ``found`` names the landmarks that nobody picked.
+    ``leave_out`` is what `sim.adapt.scan_surface.to_leave_out` reads; ``found`` names the landmarks that nobody picked.
     Closing the generator leaves the scene as it was.
 
     Raises

@@ -52,14 +52,12 @@ RELAX = (
     ("NEVER", "Never", "Keep the face as scanned"),
 )
 
-#: What of a scan is left out when a head is built.
-LEAVE_OUT = (
-    (
-        "AUTO",
-        "What Is No Skin",
-        "Leave out jumps of a depth map, flat ends of the scan, hair, and what the lips hold, such as a breathing tube",
-    ),
-    ("NEVER", "Nothing", "Take all of the scan for skin"),
+#: What of a scan is left out when a head is built, as no skin: `sim.adapt.scan_surface.NO_SKIN`.
+NO_SKIN = (
+    ("DEPTH_JUMPS", "Depth Jumps", "Leave out what a depth map has stretched from the head to the wall behind it"),
+    ("FLAT_ENDS", "Flat Ends", "Leave out where tomography stops or a bust stands on its base"),
+    ("HELD_BY_LIPS", "Held by Lips", "Leave out what the lips hold, such as a breathing tube"),
+    ("HAIR", "Hair", "Leave out hair of the head; the scalp is invented below it"),
 )
 
 
@@ -218,10 +216,12 @@ class HEADSHOP_PG_scene(bpy.types.PropertyGroup):
         description="When to make the scanned face neutral; the face as scanned is kept as the shape key Scan",
         items=RELAX,
     )
-    leave_out: EnumProperty(
+    no_skin: EnumProperty(
         name="Leave Out",
         description="What of the scan is not to be fitted; the skin is invented there",
-        items=LEAVE_OUT,
+        items=NO_SKIN,
+        default={name for name, *_ in NO_SKIN},
+        options={"ENUM_FLAG"},
     )
     show_names: BoolProperty(name="Names", description="Write each placed landmark's name beside it", default=True)
 

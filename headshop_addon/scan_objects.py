@@ -169,7 +169,7 @@ def build(context, scan: bpy.types.Object, name: str = "") -> Work:
         scan,
         context.scene,
         relax=context.scene.headshop.relax.lower(),
-        leave_out=context.scene.headshop.leave_out.lower(),
+        leave_out=",".join(sorted(context.scene.headshop.no_skin)).lower() or "never",
         found=scan_landmarks.nobody_placed(scan),
     )
     skin.matrix_world = scan.matrix_world

@@ -21,7 +21,9 @@ class HEADSHOP_PT_build(SidebarPanel, bpy.types.Panel):
         if progress(layout, "build"):
             return
         layout.prop(context.scene.headshop, "relax")
-        layout.prop(context.scene.headshop, "leave_out")
+        column = layout.column(align=True)
+        column.label(text="Leave Out")
+        column.grid_flow(columns=2, row_major=True, align=True).prop(context.scene.headshop, "no_skin")
         row = layout.row()
         row.scale_y = 1.4
         row.operator("headshop.build_head", icon="USER")

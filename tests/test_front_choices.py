@@ -5,6 +5,7 @@ import pytest
 
 from headshop.headshop_addon.command_line import main
 from headshop.sim.adapt.landmarks import write_landmarks
+from headshop.sim.adapt.scan_surface import NO_SKIN, to_leave_out
 from headshop.sim.errors import InputError
 from headshop.sim.progress import Progress, finish
 from headshop.sim.scan.ply import write_ply
@@ -32,11 +33,16 @@ def test_choices_of_the_panel(addon, asked, reference):
     scan = bridge.mesh_to_object(reference.skin, "Scan")
     addon.context.scene.collection.objects.link(scan)
     scan_landmarks.replace(scan, reference.landmark_positions())
-    for relax, leave_out in (("AUTO", "AUTO"), ("NEVER", "AUTO"), ("AUTO", "NEVER")):
-        addon.context.scene.headshop.relax, addon.context.scene.headshop.leave_out = relax, leave_out
+    settings = addon.context.scene.headshop
+    assert settings.no_skin == {name.upper() for name in NO_SKIN}
+    every = settings.no_skin
+    for relax, no_skin in (("AUTO", every), ("NEVER", {"HAIR"}), ("AUTO", {"FLAT_ENDS", "HELD_BY_LIPS"}), ("AUTO", set())):
+        settings.relax, settings.no_skin = relax, no_skin
         with pytest.raises(InputError, match="enough"):
             finish(scan_objects.build(addon.context, scan))
-        assert asked.pop() == (relax.lower(), leave_out.lower(), set())
+        asked_relax, leave_out, found = asked.pop()
+        assert (asked_relax, found) == (relax.lower(), set())
+        assert to_leave_out(leave_out) == {name.lower() for name in no_skin}
 
 
 def test_choices_on_the_command_line(asked, reference, tmp_path):
@@ -47,10 +53,20 @@ def test_choices_on_the_command_line(asked, reference, tmp_path):
         ([], ("auto", "auto")),
         (["--relax", "always"], ("always", "auto")),
         (["--leave-out", "never"], ("auto", "never")),
+        (["--leave-out", "hair,flat_ends"], ("auto", "hair,flat_ends")),
     ):
         paths = [str(scan), "--landmarks", str(landmarks), "-o", str(tmp_path / "head.blend")]
         assert main(["build", "--quiet", *paths, *words]) == 2
         assert asked.pop() == (*wanted, set())
+
+
+def test_what_is_unknown_cannot_be_left_out(asked, reference, tmp_path, capsys):
+    write_ply(tmp_path / "scan.ply", reference.skin)
+    words = ["--leave-out", "hair,tubes", "-o", str(tmp_path / "head.blend")]
+    assert main(["build", "--quiet", str(tmp_path / "scan.ply"), *words]) == 2
+    said = capsys.readouterr().err.strip()
+    assert "'tubes'" in said and all(name in said for name in ("auto", "never", *NO_SKIN)) and "\n" not in said
+    assert not asked and not (tmp_path / "head.blend").exists()
 
 
 def test_landmarks_that_nobody_placed_are_told_from_the_others(addon, asked, reference, tmp_path):

@@ -108,7 +108,7 @@ def test_a_scan_that_is_inside_out_is_turned_before_anything_is_said_of_it(refer
 
 
 def test_who_wants_to_keep_it_does(reference, marks, scan):
-    look = finish(first_look(reference, scan, marks, keep_held=True))
+    look = finish(first_look(reference, scan, marks, leave_out=("depth_jumps", "flat_ends", "hair")))
     assert look.target is scan and look.filled is scan and look.left_out["held_by_lips"] == 0
 
 
@@ -153,3 +153,14 @@ def test_lips_that_a_breathing_tube_holds_a_little_apart_are_closed(shared, refe
     fit = finish(build.build_head(reference, scan, sure, detail=0, found=set(sure))).fit
     assert fit["left_out_mm2"]["held_by_lips"] > 500
     assert fit["relaxed"] is not None and fit["relaxed"]["jaw_degrees"] > 2
+
+
+def test_a_tube_alone_is_left_out_where_only_that_is_wanted(shared, reference):
+    """The scan's flat ends are fitted then, and all there is of the face, its lips where they are."""
+    scan = clean_scan(read_ply(shared / "ct_headsq" / "skin_outer.ply"))[0]
+    sure = finish(find_landmarks(scan, reference)).sure()
+    work = build.build_head(reference, scan, sure, detail=0, relax="never", leave_out="held_by_lips", found=set(sure))
+    fit = finish(work).fit
+    left = fit["left_out_mm2"]
+    assert left["held_by_lips"] > 500 and left["depth_jumps"] == left["flat_ends"] == left["hair"] == 0
+    assert fit["mean_mm"] < 0.2 and fit["p95_mm"] < 0.6 and fit["coverage"] > 0.95

@@ -116,14 +116,14 @@ def test_who_wants_to_keep_a_flat_end_does(reference, cut_off, height):
     given = {n: marks[n] for n in SKIN if n in marks and marks[n][2] < height - 10}
     scan = Mesh.from_triangles(*cut_off)
     found = {}
-    for choice in ("auto", "never"):
+    for choice in ("auto", "never", "depth_jumps,held_by_lips,hair"):
         built = finish(build_head(reference, scan, given, detail=0, leave_out=choice))
         on_top = built.head.skin.vertices[:, 2] > height - 2
         found[choice] = np.isfinite(built.attributes["distance_mm"][on_top]).sum()
         assert bool(built.fit["left_out_mm2"]["flat_ends"]) == (choice == "auto")
         assert ("left out: a flat end;" in built.fit["sentence"]) == (choice == "auto")
-    assert found["auto"] == 0 < found["never"]
-    with pytest.raises(InputError, match="auto or never"):
+    assert found["auto"] == 0 < found["never"] <= found["depth_jumps,held_by_lips,hair"]
+    with pytest.raises(InputError, match="auto, never, or"):
         finish(build_head(reference, scan, given, leave_out="sometimes"))
 
 

@@ -22,7 +22,7 @@ from .follow import follow
 from .gate import check_against_scan, check_arrangement, check_likeness, check_on_surface
 from .landmarks import require_usable
 from .rest import BONES, rest_of
-from .scan_surface import near_head, require_leaving, without_cuts, without_jumps
+from .scan_surface import near_head, to_leave_out, without_cuts, without_jumps
 from .skin_fit import SkinFit, fit_skin
 from .skin_groups import group
 from .vestibules import vestibules
@@ -74,7 +74,7 @@ def build_head(
     relax : ``auto`` makes a face neutral whose lips are parted (`sim.relax`), ``always`` any, ``never`` none. The figures
         in ``fit`` are those of the face as scanned.
     leave_out : ``auto`` leaves out of the scan what is no skin, jumps of a depth map, flat ends, what the lips hold and hair,
-        ``never`` nothing
+        ``never`` nothing, names of these with commas between just those (`scan_surface.to_leave_out`)
     found : names of the landmarks that nobody picked: the skin is held to them more loosely
 
     Raises
@@ -86,17 +86,17 @@ def build_head(
     given = {n: np.asarray(p, dtype=float) for n, p in landmarks.items() if n in SKIN}
     require_usable(given, "The landmark set")
     require_choice(relax)
-    require_leaving(leave_out)
+    out = to_leave_out(leave_out)
     yield Progress(0.0, "Looking at the scan")
     whole = near_head(reference, scan, given)
-    smooth = whole if leave_out == "never" else without_jumps(whole)
-    target = whole if leave_out == "never" else without_cuts(smooth)
+    smooth = without_jumps(whole) if "depth_jumps" in out else whole
+    target = without_cuts(smooth) if "flat_ends" in out else smooth
     yield Progress(0.05, "Judging the landmarks")
     check_against_scan(given, target)
     check_arrangement(reference.landmark_positions(), given)
     yield Progress(0.08, "Judging the landmarks")
     check_on_surface(given, target)
-    look = yield from portion(first_look(reference, target, given, leave_out == "never", found), 0.1, 0.3)
+    look = yield from portion(first_look(reference, target, given, out, found), 0.1, 0.3)
     fit = yield from portion(fit_skin(reference, look.filled, look.landmarks, look.lips, found, look.guessed), 0.3, 0.6)
     fit = look.seen_only(fit)
     yield Progress(0.6, "Judging the fit")

@@ -14,14 +14,25 @@ from .thin_plate_spline import similarity
 NORMALS = 2.0  # mm over which the scan's normals are averaged
 MOST = 600_000  # triangles of a scan that are all looked at: edges of about 0.7 mm on a head
 ROOM = 0.35  # of the head's size that is kept around it
-#: ``auto`` leaves out what is no skin.
-CHOICES = ("auto", "never")
+#: What of a scan may be no skin: what a depth map has stretched over its jumps, where it was cut off, what the lips hold, hair.
+NO_SKIN = ("depth_jumps", "flat_ends", "held_by_lips", "hair")
 
 
-def require_leaving(choice: str) -> None:
-    """Raise `InputError` for a choice that is none of `CHOICES`."""
-    if choice not in CHOICES:
-        raise InputError(f"To leave out {choice!r} is unknown: choose {' or '.join(CHOICES)}.")
+def to_leave_out(choice: str) -> frozenset[str]:
+    """What of `NO_SKIN` a ``choice`` leaves out: all (``auto``), nothing (``never``), or what it names, commas between.
+
+    Raises
+    ------
+    InputError : the choice names something else.
+    """
+    if choice in ("auto", "never"):
+        return frozenset(NO_SKIN if choice == "auto" else ())
+    named = [name.strip() for name in choice.split(",")]
+    for name in named:
+        if name not in NO_SKIN:
+            some = f"{', '.join(NO_SKIN[:-1])} and {NO_SKIN[-1]}"
+            raise InputError(f"To leave out {name!r} is unknown: choose auto, never, or of {some}, commas between.")
+    return frozenset(named)
 
 
 def scan_surface(reference: Head, scan: Mesh, given: dict[str, np.ndarray], most: int = MOST) -> Surface:

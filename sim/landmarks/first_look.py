@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..adapt.closest import Surface
+from ..adapt.scan_surface import NO_SKIN
 from ..adapt.skin_fit import SkinFit
 from ..adapt.thin_plate_spline import similarity
 from ..anatomy.head import Head
@@ -61,12 +62,12 @@ def first_look(
     reference: Head,
     target: Surface,
     given: dict[str, np.ndarray],
-    keep_held: bool = False,
+    leave_out: Collection[str] = NO_SKIN,
     found: Collection[str] = (),
 ) -> Work:
     """Work returning the `FirstLook` at the scan ``target`` with the landmarks ``given`` (name -> (3,) mm).
 
-    keep_held : what the lips hold, and hair, is to be taken for skin
+    leave_out : of `NO_SKIN`; what the lips hold, or hair, is taken for skin where it is not among them
     found : names of those given that nobody picked: in mid-air they are guesses
     """
     rest = reference.landmark_positions()
@@ -95,11 +96,11 @@ def first_look(
     laid, skull = space.landmarks(hair.fit.points), space.landmarks(hair.scalp.points)
     laid |= {n: p for n, p in skull.items() if n.partition("_")[0] in SKULL}
     guessed = {n: p for n, p in laid.items() if n not in landmarks and n.partition("_")[0] not in untold}
-    if keep_held and hair.covered.any():  # what lies far below hair is not unseen
-        return FirstLook(landmarks, target, target, lips, guessed=guessed)
     held, covered = (np.zeros(len(each), dtype=bool) for each in (target.triangles, space.points))
-    if not keep_held:
+    kept = "hair" not in leave_out and hair.covered.any()
+    if "held_by_lips" in leave_out:
         held = held_by_lips(space, fit, target)
+    if "hair" in leave_out:
         covered |= hair.covered & ~in_face(space, hair.fit, given, BESIDE_FACE)
         covered |= hair.far & ~in_face(space, hair.fit, given, 0.0)
     shows = hair_over(space, hair.fit, target, covered)
@@ -109,6 +110,7 @@ def first_look(
     no_ear = space.ear < EAR  # ears take the reference's shape
     filled = with_hidden_skin(space, hair.fit, covered & no_ear, filled)
     unseen = unseen_scalp(space, hair.scalp, left) & ~covered
+    unseen &= not kept  # what lies far below hair is shown
     filled = with_hidden_skin(space, hair.scalp, unseen & no_ear, filled, UNSEEN)
     out = {"held_by_lips": float(target.area[held].sum()), "hair": float(target.area[shows].sum())}
     return FirstLook(landmarks, left, filled, lips, out, space.vertices[hidden | covered | unseen], guessed)
