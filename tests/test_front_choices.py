@@ -36,7 +36,12 @@ def test_choices_of_the_panel(addon, asked, reference):
     settings = addon.context.scene.headshop
     assert settings.no_skin == {name.upper() for name in NO_SKIN}
     every = settings.no_skin
-    for relax, no_skin in (("AUTO", every), ("NEVER", {"HAIR"}), ("AUTO", {"FLAT_ENDS", "HELD_BY_LIPS"}), ("AUTO", set())):
+    for relax, no_skin in (
+        ("AUTO", every),
+        ("NEVER", {"HAIR"}),
+        ("AUTO", {"FLAT_ENDS", "HELD_BY_LIPS"}),
+        ("AUTO", set()),
+    ):
         settings.relax, settings.no_skin = relax, no_skin
         with pytest.raises(InputError, match="enough"):
             finish(scan_objects.build(addon.context, scan))

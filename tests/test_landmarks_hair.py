@@ -187,7 +187,9 @@ def test_a_bald_head_is_kept_whole(reference):
 
 def test_who_wants_to_keep_hair_does(reference, shaggy):
     scan = surface_of(shaggy[0])
-    look = finish(first_look(reference, scan, of_face(shaggy[2]), leave_out=("depth_jumps", "flat_ends", "held_by_lips")))
+    look = finish(
+        first_look(reference, scan, of_face(shaggy[2]), leave_out=("depth_jumps", "flat_ends", "held_by_lips"))
+    )
     assert look.target is scan and look.filled is scan and look.left_out["hair"] == 0
 
 
