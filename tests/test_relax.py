@@ -129,6 +129,7 @@ def test_what_is_told_of_smiles_is_heeded(reference):
     told = told_of_smile(reference, responses(), as_drawn, rest_of(reference).lip_pairs[0, 0], 0.2)
     assert told.moves[0] == pytest.approx(told.moves[1] * [-1, 1, 1]) and 5 < told.moves[0, 0] < 8
     assert 5 < told.moves[0, 1] < 15
+    assert told.moves[3] == pytest.approx(told.moves[4] * [-1, 1, 1]) and 2 < told.moves[3, 0] < 3  # the wings of the nose
     table, count = responses(), 3
     noise, people = np.full(count, 1.0), 9 * np.eye(3 * count)
     rows = landmark_rows(reference.landmarks, ["ch_l", "ch_r", "n"], as_drawn.shape[0]) @ as_drawn
@@ -329,6 +330,8 @@ def test_smiling_subjects(shared, reference, name):
     assert gap(reference, result.skin) < 0.3
     found = marks_on(reference, result.skin)
     assert max(np.linalg.norm(found[corner] - truth[corner]) for corner in CORNERS) < 2.5
+    nose = {name: abs(found[name] - truth[name])[2] for name in ("sn", "al_l", "al_r")}
+    assert max(nose.values()) < 1.2, nose  # a smile hardly lifts it
     surface = read_ply(folder / f"{name}_truth.ply")
     surface = Surface(surface.vertices @ move[:3, :3].T + move[:3, 3], surface.triangles)
     seen = (reference.groups["face"] > 0.5) & (reference.groups["inner"] < 0.5)

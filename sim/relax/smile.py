@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What is known of smiles: how far they draw the corners of the mouth and lift the upper lip.
+"""What is known of smiles: how far they draw the corners of the mouth, lift the upper lip and widen the nose.
 
 A mouth that smiles is wider by 27 %, its corners go outward and up at 47 degrees, and the upper lip is shorter by 28 %
 (Tarantili, Halazonetis and Spyropoulos 2005, The spontaneous smile in dynamic motion, AJO-DO 128:8-15). That was measured
 on smiles as such, against the same person's rest; without it a wide mouth may as well be a person's own. Back the corners
 go farthest of all, with the lips closed (Schutte et al. 2023, The average facial expressions, PRS Global Open 11:e4762): as
-far as up is taken for it, and a jaw that opens takes them farther.
+far as up is taken for it, and a jaw that opens takes them farther. The nose gets wider by 14 %, and its angle with the lip stays
+(Parra et al. 2019, Three-dimensional analysis of nasolabial soft tissues while smiling, Int. J. Morphol. 37:232-236): the
+wings go apart, and its base, which bone and cartilage hold, hardly rises with the lip.
 """
 
 import numpy as np
@@ -24,6 +26,10 @@ DEVIATION = 1.8
 #: How much of a smile that seems weaker or stronger than others is believed: a face as such may look like that.
 HEEDED = 0.33
 UNTOLD = 1e3  # mm: nothing is known along that axis
+NOSE = ("al_l", "al_r", "sn")
+BROADER = 0.14
+#: mm: the wings go 1.0 to 3.9 mm, as the spread of that width at rest and in a smile says; the base of the nose.
+WINGS, BASE = 1.0, 1.5
 SMILE = 0.33  # share of a smile's lift of the corners from which on an expression is one
 
 
@@ -40,11 +46,13 @@ def told_of_smile(reference: Head, table: Responses, drawn_rows, lip: int, openi
     out = strength * WIDER * np.linalg.norm(marks["ch_l"] - marks["ch_r"]) / 2
     up = strength * SHORTER * (marks["sn"] - marks["sto"])[2]
     middle = csr_matrix(([1.0], ([0], [lip])), shape=(1, n))
-    rows = (vstack([landmark_rows(reference.landmarks, CORNERS, n), middle]) @ drawn_rows).tocsr()
+    nose = landmark_rows(reference.landmarks, NOSE, n)
+    rows = (vstack([landmark_rows(reference.landmarks, CORNERS, n), middle, nose]) @ drawn_rows).tocsr()
     rise = out * np.tan(RISE)
     corner = np.array([out, rise + (rows[:1] @ table.jaw_at(opening))[0, 1], rise])
-    moves = [corner, corner * [-1, 1, 1], [0, 0, up]]
-    sure = [[DEVIATION] * 3] * 2 + [[UNTOLD, UNTOLD, DEVIATION]]
+    aside = strength * BROADER * np.linalg.norm(marks["al_l"] - marks["al_r"]) / 2
+    moves = [corner, corner * [-1, 1, 1], [0, 0, up], [aside, 0, 0], [-aside, 0, 0], [0, 0, 0]]
+    sure = [[DEVIATION] * 3] * 2 + [[UNTOLD, UNTOLD, DEVIATION]] + [[WINGS, UNTOLD, UNTOLD]] * 2 + [[UNTOLD, BASE, BASE]]
     return Told(rows, np.array(moves), np.array(sure), smiles=True)
 
 
