@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from headshop.sim.adapt.closest import Surface
+from headshop.sim.landmarks import expression
 from headshop.sim.landmarks.expression import lips_ajar
 from headshop.sim.landmarks.find import find_landmarks
 from headshop.sim.landmarks.mouth_outline import DOWN, gap_end, mouth_outline, widest_gap
@@ -73,6 +74,29 @@ def test_lips_are_ajar_when_a_little_apart_and_what_is_wide_is_left_to_the_outli
     space = SimpleNamespace(landmarks=lambda points: _guess())
     free = SimpleNamespace(points=None, pose=Pose(1.0, np.eye(3), np.zeros(3), 0.0))
     assert lips_ajar(space, free, _face(gap=wide > 0, wide=wide)) == ajar
+
+
+@pytest.mark.parametrize(("fits", "wide", "ajar"), [(1.0, False, True), (0.8, True, True), (1.2, False, False)])
+def test_lips_are_far_apart_only_where_closed_ones_fit_plainly_worse(fits, wide, ajar, monkeypatch):
+    """A scan from above has a hole between closed lips too, where the upper one hides the edge of the lower one."""
+    closed, free = SimpleNamespace(coefficients=0, pose=None), SimpleNamespace(coefficients=1, pose=None)
+
+    def fit_shape(space, target, pose, stages, start, *_):
+        yield 1.0
+        return free if start else closed
+
+    for name, answer in {
+        "fit_shape": fit_shape,
+        "told_of_mouth": lambda space, outline: outline,
+        "line_of": lambda *_: None,
+        "about_mouth": lambda space: None,
+        "cost": lambda space, fit, about: fits if fit is free else 1.0,
+        "lips_ajar": lambda *_: True,
+    }.items():
+        monkeypatch.setattr(expression, name, answer)
+    for outline, parted in (("seen", wide), (None, ajar)):
+        monkeypatch.setattr(expression, "outline_of", lambda *_, seen=outline: seen)
+        assert finish(expression._fit_lips(SimpleNamespace(parted=1), None, closed))[1] == parted
 
 
 def test_closed_lips_have_no_outline():
