@@ -28,7 +28,7 @@ HEEDED = 0.33
 UNTOLD = 1e3  # mm: nothing is known along that axis
 NOSE = ("al_l", "al_r", "sn")
 BROADER = 0.14
-#: mm: the wings go 1.0 to 3.9 mm, as the spread of that width at rest and in a smile says; the base of the nose.
+#: mm by which a wing's way aside, and the base's, differ from person to person (our own estimates).
 WINGS, BASE = 1.0, 1.5
 SMILE = 0.33  # share of a smile's lift of the corners from which on an expression is one
 
