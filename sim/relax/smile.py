@@ -5,9 +5,9 @@ A mouth that smiles is wider by 27 %, its corners go outward and up at 47 degree
 (Tarantili, Halazonetis and Spyropoulos 2005, The spontaneous smile in dynamic motion, AJO-DO 128:8-15). That was measured
 on smiles as such, against the same person's rest; without it a wide mouth may as well be a person's own. Back the corners
 go farthest of all, with the lips closed (Schutte et al. 2023, The average facial expressions, PRS Global Open 11:e4762): as
-far as up is taken for it, and a jaw that opens takes them farther. The nose gets wider by 14 %, and its angle with the lip stays
+far as up is taken for it, and a jaw that opens takes them farther. The nose gets wider by 14 %, its angle with the lip stays
 (Parra et al. 2019, Three-dimensional analysis of nasolabial soft tissues while smiling, Int. J. Morphol. 37:232-236): the
-wings go apart, and its base, which bone and cartilage hold, hardly rises with the lip.
+wings go apart, and its base, which bone and cartilage hold, hardly rises with the lip (our own estimate).
 """
 
 import numpy as np
