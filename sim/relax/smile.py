@@ -52,7 +52,9 @@ def told_of_smile(reference: Head, table: Responses, drawn_rows, lip: int, openi
     corner = np.array([out, rise + (rows[:1] @ table.jaw_at(opening))[0, 1], rise])
     aside = strength * BROADER * np.linalg.norm(marks["al_l"] - marks["al_r"]) / 2
     moves = [corner, corner * [-1, 1, 1], [0, 0, up], [aside, 0, 0], [-aside, 0, 0], [0, 0, 0]]
-    sure = [[DEVIATION] * 3] * 2 + [[UNTOLD, UNTOLD, DEVIATION]] + [[WINGS, UNTOLD, UNTOLD]] * 2 + [[UNTOLD, BASE, BASE]]
+    sure = (
+        [[DEVIATION] * 3] * 2 + [[UNTOLD, UNTOLD, DEVIATION]] + [[WINGS, UNTOLD, UNTOLD]] * 2 + [[UNTOLD, BASE, BASE]]
+    )
     return Told(rows, np.array(moves), np.array(sure), smiles=True)
 
 
