@@ -46,16 +46,15 @@ def told_of_smile(reference: Head, table: Responses, drawn_rows, lip: int, openi
     out = strength * WIDER * np.linalg.norm(marks["ch_l"] - marks["ch_r"]) / 2
     up = strength * SHORTER * (marks["sn"] - marks["sto"])[2]
     middle = csr_matrix(([1.0], ([0], [lip])), shape=(1, n))
-    nose = landmark_rows(reference.landmarks, NOSE, n)
-    rows = (vstack([landmark_rows(reference.landmarks, CORNERS, n), middle, nose]) @ drawn_rows).tocsr()
+    corners, nose = (landmark_rows(reference.landmarks, names, n) for names in (CORNERS, NOSE))
+    rows = (vstack([corners, middle, nose]) @ drawn_rows).tocsr()
     rise = out * np.tan(RISE)
     corner = np.array([out, rise + (rows[:1] @ table.jaw_at(opening))[0, 1], rise])
     aside = strength * BROADER * np.linalg.norm(marks["al_l"] - marks["al_r"]) / 2
     moves = [corner, corner * [-1, 1, 1], [0, 0, up], [aside, 0, 0], [-aside, 0, 0], [0, 0, 0]]
-    sure = (
-        [[DEVIATION] * 3] * 2 + [[UNTOLD, UNTOLD, DEVIATION]] + [[WINGS, UNTOLD, UNTOLD]] * 2 + [[UNTOLD, BASE, BASE]]
-    )
-    return Told(rows, np.array(moves), np.array(sure), smiles=True)
+    mouth = [[DEVIATION] * 3] * 2 + [[UNTOLD, UNTOLD, DEVIATION]]
+    nose = [[WINGS, UNTOLD, UNTOLD]] * 2 + [[UNTOLD, BASE, BASE]]
+    return Told(rows, np.array(moves), np.array(mouth + nose), smiles=True)
 
 
 def told_of_jaw(told: Told, table: Responses, opening: float) -> Told:
