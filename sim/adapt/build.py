@@ -112,8 +112,8 @@ def build_head(
     scanned = head.skin.vertices + (fit.cage - skin)
     report = fit_report(reference, fit, given, scanned)
     report["invented"] = invented(fitted_shares(head, fit.fitted.fitted))
-    jumps, ends = -np.diff([each.area.sum() for each in (whole, smooth, target)])
-    report["left_out_mm2"] = {"depth_jumps": float(jumps), "flat_ends": float(ends)} | look.left_out
+    jumps, ends = (float(before.area.sum() - after.area.sum()) for before, after in ((whole, smooth), (smooth, target)))
+    report["left_out_mm2"] = {"depth_jumps": jumps, "flat_ends": ends} | look.left_out
     report["sentence"] = fit_sentence(report, report["invented"])
     if neutral is not None and relax == "never":
         head, neutral = kept_open(fit.lips_closed, head, scanned, neutral.jaw), None
