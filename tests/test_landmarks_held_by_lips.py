@@ -7,6 +7,7 @@ import pytest
 from headshop.sim.acting.plain_posing import plainly_posed
 from headshop.sim.adapt import build
 from headshop.sim.adapt.closest import Surface
+from headshop.sim.adapt.scan_surface import NO_SKIN
 from headshop.sim.anatomy.landmark_names import SKIN
 from headshop.sim.landmarks.find import find_landmarks
 from headshop.sim.landmarks.first_look import first_look
@@ -110,6 +111,11 @@ def test_a_scan_that_is_inside_out_is_turned_before_anything_is_said_of_it(refer
 def test_who_wants_to_keep_it_does(reference, marks, scan):
     look = finish(first_look(reference, scan, marks, leave_out=("depth_jumps", "flat_ends", "hair")))
     assert look.target is scan and look.filled is scan and look.left_out["held_by_lips"] == 0
+
+
+def test_it_alone_is_left_out_where_only_that_is_wanted(reference, marks, scan):
+    every, alone = (finish(first_look(reference, scan, marks, leave_out=out)) for out in (NO_SKIN, ["held_by_lips"]))
+    assert alone.left_out["held_by_lips"] == every.left_out["held_by_lips"] > 500 and alone.left_out["hair"] == 0
 
 
 def test_the_head_has_no_tube_and_says_so(reference, marks, scan, face, tube):

@@ -139,6 +139,8 @@ def test_what_is_told_of_smiles_is_heeded(reference):
     without, heeded = (explain(*given, told=what) for what in (None, told))
     far, near = (np.abs((told.rows @ found.displacement - told.moves)[0, [0, 2]]).max() for found in (without, heeded))
     assert lifted(told, table, heeded) > LEAST and near < 0.7 * far
+    base = [abs((told.rows @ found.displacement)[5, 2]) for found in (without, heeded)]
+    assert base[1] < 0.5 * base[0]  # of the nose
     stronger = told_of_smile(reference, table, as_drawn, rest_of(reference).lip_pairs[0, 0], 0.2, lift=1.3)
     assert np.all(np.abs(stronger.moves[0]) > np.abs(told.moves[0])) and stronger.moves[2, 2] > told.moves[2, 2]
 

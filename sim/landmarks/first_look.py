@@ -109,8 +109,7 @@ def first_look(
     filled = with_hidden_skin(space, fit, hidden, left)
     no_ear = space.ear < EAR  # ears take the reference's shape
     filled = with_hidden_skin(space, hair.fit, covered & no_ear, filled)
-    unseen = unseen_scalp(space, hair.scalp, left) & ~covered
-    unseen &= not kept  # what lies far below hair is shown
+    unseen = unseen_scalp(space, hair.scalp, left) & ~covered & (not kept)  # what lies far below hair is not unseen
     filled = with_hidden_skin(space, hair.scalp, unseen & no_ear, filled, UNSEEN)
     out = {"held_by_lips": float(target.area[held].sum()), "hair": float(target.area[shows].sum())}
     return FirstLook(landmarks, left, filled, lips, out, space.vertices[hidden | covered | unseen], guessed)
