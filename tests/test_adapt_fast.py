@@ -210,13 +210,11 @@ def test_thousands_of_landmarks_are_warped_in_small_tables(monkeypatch):
     assert max(sizes) <= 50_000 and sum(sizes) == 1500 * (1500 + 4000)
 
 
-def test_facing_tells_a_surface_from_one_turned(uneven):
+def test_a_surface_is_told_from_one_turned_inside_out(uneven):
     surface, queries = uneven
     out = queries[60:120]  # corners of it
-    facing = surface.facing(out, 20.0)
-    assert (
-        np.median(np.einsum("ij,ij->i", facing, out))
-        > 0
-        > np.median(np.einsum("ij,ij->i", surface.turned().facing(out, 20.0), out))
-    )
-    assert not surface.facing(out + 5000, 20.0).any()
+    facing, turned = (of.facing(out, 20.0) for of in (surface, surface.turned()))
+    assert np.median(np.einsum("ij,ij->i", facing, out)) > 0 > np.median(np.einsum("ij,ij->i", turned, out))
+    assert not surface.inside_out(out, out, 20.0) and surface.turned().inside_out(out, out, 20.0)
+    far = out + 5000
+    assert not surface.facing(far, 20.0).any() and not surface.turned().inside_out(far, out, 20.0)

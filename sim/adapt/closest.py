@@ -291,6 +291,13 @@ class Surface:
         out[found] = self.face_normals[self.cover.owner[sample[found, 0]]]
         return out
 
+    def inside_out(self, points, normals, reach: float) -> bool:
+        """Whether most of what is within ``reach`` mm of ``points`` (k, 3) of a skin faces the other way than their
+        ``normals`` (k, 3): scans may be wound either way."""
+        facing = self.facing(points, reach)
+        agree = np.einsum("ij,ij->i", facing, normals)[facing.any(axis=1)]
+        return len(agree) > 0 and bool(np.median(agree) < 0)
+
     def ranked(
         self, points, normals, reach: float, agreement: float = 0.5, near: int = 24, bend: float = 1.0
     ) -> Contacts:

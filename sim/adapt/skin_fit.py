@@ -136,7 +136,8 @@ def _fitting(
     aim = np.concatenate([goal, margin_goal])
     first = ThinPlateSpline.fit(np.concatenate([marks, skin.vertices[margin]]), aim, give)
     moved = first.transform(skin.vertices)
-    if faces_in(data, moved, outer):
+    used = np.unique(outer)[::4]  # enough to tell
+    if data.inside_out(moved[used], vertex_normals(moved, outer)[used], 20.0):
         same = data is target
         target = target.turned()
         data = target if same else data.turned()
@@ -216,14 +217,6 @@ def feature_triangles(reference: Head, names) -> np.ndarray:
     place = {name: k for k, name in enumerate(names)}
     order = np.array([place.get(name, -1) for name in reference.landmarks.names], dtype=np.int32)
     return order[reference.feature_mesh]
-
-
-def faces_in(data: Surface, skin: np.ndarray, outer: np.ndarray) -> bool:
-    """Whether most of ``data`` faces the other way than the skin beside it (scans wound inside out)."""
-    used = np.unique(outer)[::4]  # enough to tell
-    facing = data.facing(skin[used], 20.0)
-    agree = np.einsum("ij,ij->i", facing, vertex_normals(skin, outer)[used])[facing.any(axis=1)]
-    return len(agree) > 0 and np.median(agree) < -0.2
 
 
 def refinable(reference: Head, outer: np.ndarray, rim: np.ndarray) -> np.ndarray:

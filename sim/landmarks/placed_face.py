@@ -169,9 +169,8 @@ def facing_out(space: ShapeSpace, target: Surface, pose: Pose) -> Surface:
     """The scan ``target``, turned inside out if its normals face away from those of a skin at ``pose``."""
     points = pose.scale * space.points @ pose.turn.T + pose.shift
     face = space.face > 0.5
-    found = target.closest(points[face], 15.0)
-    agree = np.einsum("ij,ij->i", found.normals, vertex_normals(points, space.triangles)[face])[found.found]
-    return target.turned() if len(agree) and np.median(agree) < 0 else target
+    normals = vertex_normals(points, space.triangles)
+    return target.turned() if target.inside_out(points[face], normals[face], 15.0) else target
 
 
 def run(work, start: float, stop: float, label: str) -> Work:
