@@ -79,6 +79,15 @@ def test_a_corner_in_a_hole_is_not_told():
     assert found.corners["ch_l"] == pytest.approx([HALF, HALF**2 / 40, RISE], abs=2.0)
 
 
+def test_what_of_the_mouth_shows_through_the_slit_is_not_where_lips_meet():
+    face, behind = _face(slit=True), 14.0  # mm
+    corners = np.array([[-2.0, behind, -1.5], [2.0, behind, -1.5], [2.0, behind, 1.5], [-2.0, behind, 1.5]])
+    speck = np.array([[0, 1, 2], [0, 2, 3]]) + len(face.vertices)
+    through = Surface(np.concatenate([face.vertices, corners]), np.concatenate([face.triangles, speck]))
+    for surface in (face, through):
+        assert lip_line(surface, _guess(4.0, 1.0), FORWARD).middle == pytest.approx([0, 0, 0], abs=1.0)
+
+
 @pytest.mark.parametrize("noise", [0.0, 0.15])
 def test_smooth_skin_has_no_line(noise):
     assert lip_line(_face(deep=0.0, noise=noise), _guess(), FORWARD) is None
