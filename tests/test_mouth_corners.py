@@ -76,8 +76,13 @@ def test_lips_are_ajar_when_a_little_apart_and_what_is_wide_is_left_to_the_outli
     assert lips_ajar(space, free, _face(gap=wide > 0, wide=wide)) == ajar
 
 
-@pytest.mark.parametrize(("fits", "wide", "ajar"), [(1.0, False, True), (0.8, True, True), (1.2, False, False)])
-def test_lips_are_far_apart_only_where_closed_ones_fit_plainly_worse(fits, wide, ajar, monkeypatch):
+@pytest.mark.parametrize(
+    ("fits", "teeth", "wide", "ajar"),
+    [(1.0, False, False, True), (1.0, True, True, True), (0.8, False, True, True), (1.2, True, False, False)],
+)
+def test_lips_are_far_apart_only_where_teeth_show_it_or_closed_ones_fit_plainly_worse(
+    fits, teeth, wide, ajar, monkeypatch
+):
     """A scan from above has a hole between closed lips too, where the upper one hides the edge of the lower one."""
     closed, free = SimpleNamespace(coefficients=0, pose=None), SimpleNamespace(coefficients=1, pose=None)
 
@@ -92,11 +97,27 @@ def test_lips_are_far_apart_only_where_closed_ones_fit_plainly_worse(fits, wide,
         "about_mouth": lambda space: None,
         "cost": lambda space, fit, about: fits if fit is free else 1.0,
         "lips_ajar": lambda *_: True,
+        "teeth_seen": lambda *_: teeth,
     }.items():
         monkeypatch.setattr(expression, name, answer)
     for outline, parted in (("seen", wide), (None, ajar)):
         monkeypatch.setattr(expression, "outline_of", lambda *_, seen=outline: seen)
         assert finish(expression._fit_lips(SimpleNamespace(parted=1), None, closed))[1] == parted
+
+
+@pytest.mark.parametrize(("teeth", "behind"), [(False, 5.0), (True, 5.0), (True, 20.0)])
+def test_teeth_between_lips_are_seen(teeth, behind):
+    face = _face()
+    if teeth:  # crowns 6 mm high under the upper lip
+        across, up = (side.ravel() for side in np.meshgrid(np.linspace(-14, 14, 29), np.linspace(1, 7, 7)))
+        crowns = np.stack([across, across**2 / 40 + behind, up], axis=1)
+        k = np.arange(len(crowns)).reshape(7, 29)
+        a, b, c, d = k[:-1, :-1].ravel(), k[:-1, 1:].ravel(), k[1:, 1:].ravel(), k[1:, :-1].ravel()
+        more = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)]) + len(face.vertices)
+        face = Surface(np.concatenate([face.vertices, crowns]), np.concatenate([face.triangles, more]))
+    space = SimpleNamespace(landmarks=lambda points: _guess())
+    free = SimpleNamespace(points=None, pose=Pose(1.0, np.eye(3), np.zeros(3), 0.0))
+    assert expression.teeth_seen(space, free, face) == (teeth and behind < 12)
 
 
 def test_closed_lips_have_no_outline():
