@@ -78,9 +78,15 @@ def test_lips_are_ajar_when_a_little_apart_and_what_is_wide_is_left_to_the_outli
 
 @pytest.mark.parametrize(
     ("fits", "teeth", "wide", "ajar"),
-    [(1.0, False, False, True), (1.0, True, True, True), (0.8, False, True, True), (1.2, True, False, False)],
+    [
+        (1.0, False, False, True),
+        (1.0, True, True, True),
+        (0.8, False, True, True),
+        (1.2, False, False, False),
+        (1.2, True, True, False),
+    ],
 )
-def test_lips_are_far_apart_only_where_teeth_show_it_or_closed_ones_fit_plainly_worse(
+def test_lips_are_far_apart_only_where_teeth_show_or_closed_ones_fit_plainly_worse(
     fits, teeth, wide, ajar, monkeypatch
 ):
     """A scan from above has a hole between closed lips too, where the upper one hides the edge of the lower one."""

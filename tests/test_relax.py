@@ -263,6 +263,7 @@ def test_the_end_of_the_upper_teeth():
     lip, teeth, hole = np.zeros(10), np.full(12, 5.0), np.full(6, np.nan)
     seen = np.concatenate([lip, hole[:2], teeth, hole, hole, lip])
     assert end_of_teeth(seen, 0.5) == 23
+    assert end_of_teeth(np.concatenate([lip, hole, teeth[:4], hole, hole, lip]), 0.5) == 19  # little of them
     assert end_of_teeth(np.concatenate([lip, hole[:2], teeth, lip]), 0.5) is None  # they rest on the lower lip
     assert end_of_teeth(np.concatenate([lip, hole, hole, hole, teeth, hole, lip]), 0.5) is None  # lower teeth
     assert end_of_teeth(np.concatenate([lip, hole, lip]), 0.5) is None

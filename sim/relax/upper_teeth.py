@@ -14,7 +14,7 @@ from .mouth_gap import EATEN, MARKS, SPECK, STEP, STEPS, profiles
 SHARES = np.linspace(-0.3, 0.3, 25)  # of the way from the middle of the mouth to its corners: incisors
 FEWEST = 8  # lines with an edge
 SHADE = 6.0  # mm under the upper lip that it may hide
-CROWN = (2.0, 13.0)  # mm of a tooth that are seen
+CROWN = (1.8, 13.0)  # mm of a tooth that are seen
 BEHIND = (-1.0, 12.0)  # mm that teeth lie behind the lip
 CLEAR = 2.0  # mm from the edge of the teeth to the lower lip: on the lip, it is not seen
 STRAY = 1.0  # mm: edges lie in a line, but for half of them
@@ -53,7 +53,9 @@ def end_of_teeth(depth: np.ndarray, step: float) -> int | None:
         return None
     lip = runs[0]
     for run in runs[1:-1]:
-        seen, shade, clear = (step * (b - a) for a, b in ((run[0], run[-1]), (lip[-1], run[0]), (run[-1], runs[-1][0])))
+        seen, shade, clear = (
+            step * (b - a) for a, b in ((run[0], run[-1] + 1), (lip[-1], run[0]), (run[-1], runs[-1][0]))
+        )
         behind = depth[run].mean() - depth[lip[-3:]].mean()
         if CROWN[0] <= seen <= CROWN[1] and shade <= SHADE and clear >= CLEAR and BEHIND[0] < behind < BEHIND[1]:
             return int(run[-1])
