@@ -21,13 +21,18 @@ HALF, OPEN, RISE = 25.0, 16.0, 6.0  # mm: half the mouth's width, how far it is 
 FORWARD = np.array([0.0, -1.0, 0.0])
 
 
+def _triangles(shape):
+    """(m, 3) over a grid of points."""
+    k = np.arange(np.prod(shape)).reshape(shape)
+    a, b, c, d = k[:-1, :-1].ravel(), k[:-1, 1:].ravel(), k[1:, 1:].ravel(), k[1:, :-1].ravel()
+    return np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
+
+
 def _face(gap=True, teeth=False, wide=OPEN):
     """A rounded surface with a gap in it like that between smiling lips, ``wide`` mm, and teeth behind it, if any."""
     x, z = np.meshgrid(np.arange(-60, 60.1, 0.8), np.arange(-60, 40.1, 0.8))
     points = np.stack([x, x**2 / 40, z], axis=2).reshape(-1, 3)
-    k = np.arange(x.size).reshape(x.shape)
-    a, b, c, d = k[:-1, :-1].ravel(), k[:-1, 1:].ravel(), k[1:, 1:].ravel(), k[1:, :-1].ravel()
-    triangles = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
+    triangles = _triangles(x.shape)
     across, _, up = points[triangles].mean(axis=1).T
     share = across / HALF
     inside = np.abs(up - RISE * share**2) < wide / 2 * (1 - share**2)
@@ -115,11 +120,9 @@ def test_lips_are_far_apart_only_where_teeth_show_or_closed_ones_fit_plainly_wor
 def test_teeth_between_lips_are_seen(teeth, behind):
     face = _face()
     if teeth:  # crowns 6 mm high under the upper lip
-        across, up = (side.ravel() for side in np.meshgrid(np.linspace(-14, 14, 29), np.linspace(1, 7, 7)))
-        crowns = np.stack([across, across**2 / 40 + behind, up], axis=1)
-        k = np.arange(len(crowns)).reshape(7, 29)
-        a, b, c, d = k[:-1, :-1].ravel(), k[:-1, 1:].ravel(), k[1:, 1:].ravel(), k[1:, :-1].ravel()
-        more = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)]) + len(face.vertices)
+        across, up = np.meshgrid(np.linspace(-14, 14, 29), np.linspace(1, 7, 7))
+        crowns = np.stack([across, across**2 / 40 + behind, up], axis=2).reshape(-1, 3)
+        more = _triangles(across.shape) + len(face.vertices)
         face = Surface(np.concatenate([face.vertices, crowns]), np.concatenate([face.triangles, more]))
     space = SimpleNamespace(landmarks=lambda points: _guess())
     free = SimpleNamespace(points=None, pose=Pose(1.0, np.eye(3), np.zeros(3), 0.0))

@@ -37,7 +37,7 @@ FAR_APART = 12.0  # mm: what is ajar is less
 #: degrees), and 0.89 to 1.01 on seven closed ones that a scanner saw from 27 to 40 degrees above, where the upper lip hides the
 #: edge of the lower one: two of these are still taken for parted. Where the edge of the upper teeth is seen between them,
 #: they are parted, whatever fits: two more smiles fitted 0.93 and 1.0 of closed ones. All of 27 seen from in front showed
-#: that edge, and none of 13 closed mouths from above.
+#: that edge, and of closed mouths from above none of the eight between whose lips a gap was seen.
 NO_WORSE, BETTER = 1.05, 0.93
 FEW = 25  # percent of them at which lips that are parted may seem closed: noise looks like edges in places only
 

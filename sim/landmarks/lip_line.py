@@ -26,8 +26,8 @@ ALONG = 9  # columns over which it is averaged
 PLAIN = 0.75
 MIDDLE = 10.0  # mm to either side of the middle where it must be as deep
 AROUND = 4  # columns beside a corner that tell how deep it lies, and must not lie in a hole
-#: mm behind where they are taken to meet: what lies deeper between lips is no lip, but mouth that shows through. Closed
-#: ones met from 4 mm before to 6 mm behind in 40 scans, and what showed through lay 14 mm behind.
+#: mm behind where they are taken to meet: what lies deeper between lips is no lip, but mouth that shows through. In the 15
+#: scans of 42 that show where closed ones meet they did from 4 mm before to 6 mm behind; what showed through lay 14 behind.
 WITHIN = 9.0
 SLIT = 4.0  # mm from above to below of what a scanner loses between lips; what is wider is a hole, and tells nothing
 
