@@ -52,6 +52,8 @@ def build(options) -> None:
         _write_plain(skin, plain, outputs)
     if not options.quiet:
         print(f"{options.output}: {report['fit']['sentence']}")
+        if report["fit"]["advice"]:
+            print(report["fit"]["advice"])
 
 
 def landmarks(options) -> None:

@@ -57,6 +57,8 @@ def _result(layout, context, skin):
         side.label(text=f"{fit['relaxed']['jaw_degrees']:.1f}\N{DEGREE SIGN}")
     if "sentence" in fit:
         hint(layout, context, fit["sentence"], "CHECKMARK")
+    if fit.get("advice"):
+        hint(layout, context, fit["advice"])
     _show(layout, skin)
     _fit(layout, context, skin)
     if detail_images.images_of(skin) is not None:

@@ -100,6 +100,18 @@ def test_lids_that_meet_have_one_crease_where_they_do(seen_skin):
         assert np.abs(line.at(share) - met)[2] < 1.0
 
 
+def test_a_fold_farther_off_than_margins_are_leaves_lids_shut(reference):
+    marks = reference.landmark_positions()
+    middle = np.mean([marks[f"{name}_{side}"] for name in ("en", "ex") for side in BOTH], axis=0)
+    x, z = np.meshgrid(np.arange(-80, 81, 4.0), np.arange(-20, 20.25, 0.25))
+    n, k = x.shape[1], np.arange(x.size).reshape(x.shape)[:-1, :-1].ravel()
+    triangles = np.concatenate([np.stack([k, k + 1, k + n], axis=1), np.stack([k + 1, k + n + 1, k + n], axis=1)])
+    for apart, shut in ((9.0, False), (12.5, True)):
+        creases = np.isin(z, np.add.outer([-4.0, apart - 4.0], [-0.25, 0, 0.25]))
+        target = Surface(middle + np.stack([x, 1.2 * creases, z], axis=-1).reshape(-1, 3), triangles)
+        assert shut_by_creases({side: lid_line(marks, side, target, np.eye(3)) for side in BOTH}) is shut
+
+
 def test_margins_of_open_lids_have_two_creases(seen_skin):
     """Eyeballs that are scanned leave no hole between open lids."""
     target, marks = seen_skin((), ("eye_l", "eye_r"))

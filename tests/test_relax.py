@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from headshop.sim.acting.pose import Pose, control
+from headshop.sim.adapt.build import build_head
 from headshop.sim.adapt.closest import Surface
 from headshop.sim.adapt.landmarks import read_landmarks
 from headshop.sim.adapt.rest import rest_of
@@ -213,6 +214,22 @@ def test_closed_lips_are_left_alone_unless_asked(reference, people):
     assert fit.reference is reference
     assert neutral_of(fit, "auto") is None and neutral_of(fit, "never") is None
     assert neutral_of(fit, "always") is not None
+
+
+def test_a_smile_with_closed_lips_is_said_to_be_one(reference, reference_model, people):
+    """It is left alone, as a person may look like that; asked to, it is taken away."""
+    smile = solve(reference_model, control(reference_model, Pose(SMILE)), max_iterations=150).state.skin
+    neutral, _ = people[1]
+    smiling = neutral + fleshed(reference, smile - reference.skin.vertices)
+    marks = marks_on(reference, smiling)
+    assert marks["ch_l"][2] - marks_on(reference, neutral)["ch_l"][2] > 4
+    for relax, asked in (("auto", False), ("always", True)):
+        built = finish(build_head(reference, scan_of(reference, smiling), marks, detail=0, relax=relax))
+        assert (built.fit["advice"] is None) == asked and (built.fit["relaxed"] is not None) == asked
+    found, truth = marks_on(reference, built.head.skin.vertices), marks_on(reference, neutral)
+    assert max(np.linalg.norm(found[name] - truth[name]) for name in CORNERS) < 4
+    built = finish(build_head(reference, scan_of(reference, neutral), marks_on(reference, neutral), detail=0))
+    assert built.fit["advice"] is None and built.fit["relaxed"] is None
 
 
 def test_edges_of_lips():

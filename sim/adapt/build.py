@@ -14,10 +14,10 @@ from ..errors import InputError
 from ..mesh import Mesh
 from ..mesh_subdivision import drawn, smoother
 from ..progress import Progress, Work, portion
-from ..relax.choice import kept_open, neutral_of, require_choice
+from ..relax.choice import kept_open, neutral_of, require_choice, smiles_closed
 from .bone import depth_under
 from .closest import Surface
-from .fit_sentence import fit_sentence, fitted_shares, invented
+from .fit_sentence import SMILES_CLOSED, fit_sentence, fitted_shares, invented
 from .follow import follow
 from .gate import check_against_scan, check_arrangement, check_likeness, check_on_surface
 from .landmarks import require_usable
@@ -40,7 +40,7 @@ class BuildResult:
     head : the fitted head, in the scan's own place (mm)
     fit : mean_mm, p95_mm, max_mm (skin to scan, where the face has data), coverage (share of the face with data),
         landmark_mean_mm (given landmarks to the skin's own), the share ``within_1mm``, what was ``invented`` and the
-        ``sentence`` that says all this
+        ``sentence`` that says all this; ``advice``, a sentence that says what else could be done, or None
     anatomy : muscles (count), skull_penetrations (bone vertices outside the skin), tissue_thickness_mm
     landmarks_missing : names of landmarks that were not given
     attributes : per skin vertex (n,) float32: ``fitted`` 0..1 (0: invented by the warp), ``distance_mm`` to the scan
@@ -118,6 +118,7 @@ def build_head(
     if neutral is not None and relax == "never":
         head, neutral = kept_open(fit.lips_closed, head, scanned, neutral.jaw), None
     report["relaxed"] = None if neutral is None else neutral.report
+    report["advice"] = SMILES_CLOSED if relax == "auto" and neutral is None and smiles_closed(fit) else None
     yield Progress(0.87, "Checking the anatomy")
     anatomy = anatomy_report(head)
     missing = tuple(n for n in SKIN if n not in given)

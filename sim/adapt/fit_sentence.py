@@ -24,6 +24,10 @@ LEFT_OUT = {
     "held_by_lips": "what the lips hold",
     "hair": "hair",
 }
+#: What is advised where a face whose lips are closed seems to smile.
+SMILES_CLOSED = (
+    "It seems to smile with its lips closed: to have it neutral, build it with Relax set to Always (--relax always)."
+)
 SIDED = ("eyelids", "cheek", "ear")
 FITTED = 0.3  # a vertex counts as fitted from here on
 MOST, ALL = 0.4, 0.1  # share of a region that was fitted, below which it counts as invented for the most part, wholly

@@ -40,7 +40,8 @@ LEFT_OUT = ("sto", "v", "op", "tr", *(f"{m}_{s}" for m in "go sa sba pra pa obs 
 
 @dataclass(frozen=True, eq=False)
 class Relaxed:
-    """skin (n, 3) mm, the neutral cage; jaw : how far it was open, 0..1; report : what was done, for people to read."""
+    """skin (n, 3) mm, the neutral cage; jaw : how far it was open, 0..1; report : what was done, for people to read
+    (``smile``: how far the face seems to smile, of what smiles lift the corners of the mouth)."""
 
     skin: np.ndarray
     jaw: float
@@ -107,6 +108,7 @@ def relaxed(reference: Head, skin, fitted, unseen=None, teeth=()) -> Relaxed:
     report = {
         "jaw_degrees": float(np.degrees(found.jaw * reference.jaw.open_max)),
         "smiles": smiling,
+        "smile": round(lift, 3),
         "muscles": {name: round(found.muscles[name], 3) for name in strongest if found.muscles[name] >= 0.05},
         "lips_apart_mm": gap,
         "upper_teeth_seen": meet is not None,
