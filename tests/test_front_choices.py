@@ -4,6 +4,7 @@
 import pytest
 
 from headshop.headshop_addon.command_line import main
+from headshop.sim.adapt import build
 from headshop.sim.adapt.landmarks import write_landmarks
 from headshop.sim.adapt.scan_surface import NO_SKIN, to_leave_out
 from headshop.sim.errors import InputError
@@ -63,6 +64,18 @@ def test_choices_on_the_command_line(asked, reference, tmp_path):
         paths = [str(scan), "--landmarks", str(landmarks), "-o", str(tmp_path / "head.blend")]
         assert main(["build", "--quiet", *paths, *words]) == 2
         assert asked.pop() == (*wanted, set())
+
+
+def test_the_terminal_says_what_else_could_be_done(blender, reference, tmp_path, capsys, monkeypatch):
+    scan, landmarks = tmp_path / "scan.ply", tmp_path / "landmarks.json"
+    write_ply(scan, reference.skin)
+    write_landmarks(landmarks, reference.landmark_positions())
+    paths = [str(scan), "--landmarks", str(landmarks), "-o", str(tmp_path / "head.blend"), "--detail", "0"]
+    for smiles, lines in ((False, 1), (True, 2)):
+        monkeypatch.setattr(build, "smiles_closed", lambda fit, smiles=smiles: smiles)
+        assert main(["build", *paths]) == 0
+        said = capsys.readouterr().out.strip().splitlines()[-lines:]
+        assert ": Fitted " in said[0] and ("--relax always" in said[-1]) == smiles
 
 
 def test_what_is_unknown_cannot_be_left_out(asked, reference, tmp_path, capsys):

@@ -161,9 +161,10 @@ def test_a_head_shows_every_slider_once_and_every_expression(addon, reference):
 
     heads.create_head(reference, "Ref")
     skin = heads.find_heads()[0]
-    heads.write_report(skin, {"fit": {"mean_mm": 0.4, "p95_mm": 1.5, "landmark_mean_mm": 2.0}})
+    fit = {"mean_mm": 0.4, "p95_mm": 1.5, "landmark_mean_mm": 2.0, "advice": "Build it anew."}
+    heads.write_report(skin, {"fit": fit})
     drawn = draw_all(addon)
-    assert "0.40 mm" in _text(drawn, "build")
+    assert "0.40 mm" in _text(drawn, "build") and "Build it anew." in _text(drawn, "build")
     sliders = sum((seen for name, seen in drawn.items() if name.startswith("HEADSHOP_PT_muscles_")), [])
     sides = [text for text in sliders if text in ("L", "R")]
     paired = [muscle for muscle in reference.muscles if muscle.name.endswith(("_l", "_r"))]

@@ -106,7 +106,7 @@ def test_a_fold_farther_off_than_margins_are_leaves_lids_shut(reference):
     x, z = np.meshgrid(np.arange(-80, 81, 4.0), np.arange(-20, 20.25, 0.25))
     n, k = x.shape[1], np.arange(x.size).reshape(x.shape)[:-1, :-1].ravel()
     triangles = np.concatenate([np.stack([k, k + 1, k + n], axis=1), np.stack([k + 1, k + n + 1, k + n], axis=1)])
-    for apart, shut in ((9.0, False), (12.5, True)):
+    for apart, shut in ((9.0, False), (12.75, True)):
         creases = np.isin(z, np.add.outer([-4.0, apart - 4.0], [-0.25, 0, 0.25]))
         target = Surface(middle + np.stack([x, 1.2 * creases, z], axis=-1).reshape(-1, 3), triangles)
         assert shut_by_creases({side: lid_line(marks, side, target, np.eye(3)) for side in BOTH}) is shut
