@@ -23,13 +23,15 @@ from headshop.sim.tissue.solids import build_solid
 from headshop.sim.tissue.solver import rest_state, solve
 
 SHOWN = ("eyeBlinkLeft", "mouthRollUpper", "mouthClose", "noseSneerLeft")
-#: Where bone went through the floor of the mouth, lips past each other, their corners and the last molar into each other.
+#: Where bone went through the floor of the mouth, lips past each other, their corners and the last molar into each other,
+#: and where a corner of the lips turned inside out on its way out of the other lip.
 WORST = (
     ("jawOpen", "mouthClose"),
     ("mouthPucker", "mouthRollLower"),
     ("jawLeft", "mouthRollUpper"),
     ("jawForward", "jawRight"),
     ("mouthClose", "mouthPressLeft"),
+    ("jawRight", "mouthRollLower"),
 )
 
 

@@ -64,16 +64,21 @@ def cleared(model: Model, pose, positions) -> np.ndarray:
     """(3 n, 3) mm: ``positions`` with the drawn skin out of eyeballs, teeth, gums and the other lip, flesh between
     skin and lining, fascia out of bone, and shut lids met."""
     out = met(model, pose.shut, positions)
-    out = out.copy() if out is positions else out
     n = model.count
-    for _ in range(ROUNDS):
+    skin, least = out[:n], np.inf
+    for _ in range(ROUNDS + 1):
         found = surfaces_of(model, pose, out, OFF_BONE)
         found["flesh"] = planes_of([flesh_contacts(model.drawn.flesh, out[:n])], n)
         out = project(found.pop("fascia_skull"), out, rounds=1)
-        move = way_out(joined(*found.values()), out, model.layers.free[:n])
+        planes = joined(*found.values())
+        left = np.sum(np.maximum(row_depths(planes, out) - LEAVE, 0) ** 2)
+        if left < least:  # where skin is crumpled, normals mislead, and each way out may lead deeper in
+            skin, least = out[:n].copy(), left
+        move = way_out(planes, out, model.layers.free[:n])
         if move is None:
             break
         out[:n] += move
+    out[:n] = skin
     return out
 
 

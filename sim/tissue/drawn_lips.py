@@ -12,9 +12,9 @@ from .geometry import short_diagonals, unit
 
 #: mm between the points of lips at which what is left of penetration is looked for, and the other lip's that are looked at.
 FINE, MANY = 0.5, 6
-#: mm beside each other at which points are across from each other, at least; cosine to its normal at rest that a normal has
-#: where the surface has turned over.
-BESIDE, TURNED = 0.9, -0.5
+#: mm beside each other at which points are across from each other, at least; cosine to its normal at rest below which
+#: a point's normal tells nothing: the surface is crumpled there.
+BESIDE, TURNED = 0.9, 0.0
 #: mm from the other lip, at rest, that the surface of a lip is looked at; mm by which a lip is at least thick, and where it
 #: joins the other. Two points with flesh between them are apart at rest, by more than this share of their distance, against
 #: the way they face.
@@ -77,6 +77,7 @@ def _across(lips: Lips, places, normals, most, reach):
     (c, 3) from these to those, and the mm (c,) that they keep."""
     if min(len(x) for x in lips.points) < 3:
         return
+    told = [n.any(axis=1) for n in normals]
     for own, other in ((0, 1), (1, 0)):
         near = range(1, 1 + lips.mates)
         distance, mate = cKDTree(places[other]).query(places[own], near, distance_upper_bound=reach)
@@ -94,19 +95,20 @@ def _across(lips: Lips, places, normals, most, reach):
         through = gap < -np.where(lips.joins[own][which] | lips.joins[other][mate], CORNER_THIN, thin)
         # more than 60 degrees between their normals, across from each other, and no flesh between them: round the corner of
         # the mouth two points may be back to back
-        ok = np.flatnonzero((size > 1.0) & (beside < lips.beside**2) & ~through)
+        both = told[own][which] & told[other][mate]
+        ok = np.flatnonzero(both & (size > 1.0) & (beside < lips.beside**2) & ~through)
         ok = ok[np.unique(which[ok], return_index=True)[1]]  # the nearest of each
         yield own, other, which[ok], mate[ok], facing[ok], np.minimum(gap[ok], most)
 
 
 def _lips_at(points, skin, normals, rest):
     """Where both lips' ``points`` are and their normals: those of what is drawn if their fans are known, else between the
-    vertices' ``normals`` (n, 3); so too where a crumpled surface has turned over, against its normals at ``rest``."""
+    vertices' ``normals`` (n, 3); 0 where a crumpled surface has turned against its normals at ``rest``."""
     places, out = [x.at(skin) for x in points], []
     for x, at, before in zip(points, places, rest, strict=True):
-        normal = unit(x.at(normals))
-        if x.fan is not None:
+        if x.fan is None:
+            out.append(unit(x.at(normals)))
+        else:
             drawn = x.fan.normals(at, skin)
-            normal = np.where(np.einsum("ij,ij->i", drawn, before)[:, None] > TURNED, drawn, normal)
-        out.append(normal)
+            out.append(np.where(np.einsum("ij,ij->i", drawn, before)[:, None] > TURNED, drawn, 0))
     return places, out
