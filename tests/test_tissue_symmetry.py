@@ -47,7 +47,7 @@ def test_layers_mirror(reference_model, mate):
 def test_left_muscles_do_the_mirror_image_of_the_right_ones(reference_model, mate, lot):
     left = [name for name in reference_model.muscle_names if name.endswith("_l") and base_name(name) not in JAW_MUSCLES]
     assert len(left) > 20
-    assert _farthest(reference_model, mate, dict.fromkeys(left[lot::GROUPS], 1.0)) < 0.1
+    assert _farthest(reference_model, mate, dict.fromkeys(left[lot::GROUPS], 1.0)) < 0.05
 
 
 def test_jaw_to_the_side_mirrors(reference_model, mate):

@@ -78,8 +78,8 @@ def build_solid(mesh: Mesh, lower: bool, about: np.ndarray, spacing: float = 0.5
     seen = ~_buried(points, normal[owner], kind[owner], spacing)
     points, owner = points[seen], owner[seen]
     near = np.isfinite(cKDTree(about).query(points, distance_upper_bound=reach)[0])
-    points, owner = points[near], owner[near]
-    return Solid(points, normal[owner], kind[owner], cKDTree(points), lower, spacing)
+    points, normal, kind = _once(points[near], normal[owner[near]], kind[owner[near]])
+    return Solid(points, normal, kind, cKDTree(points), lower, spacing)
 
 
 def _covered(tri, spacing):
@@ -95,6 +95,19 @@ def _covered(tri, spacing):
         points.append(np.einsum("pk,tkx->tpx", weight, tri[which]).reshape(-1, 3))
         owner.append(np.repeat(which, len(weight)))
     return np.concatenate(points), np.concatenate(owner)
+
+
+def _once(points, normal, kind):
+    """``points`` (k, 3) that triangles share once each, with the mean of their ``normal`` (k, 3) and the least ``kind`` (k,):
+    which of several is nearest would be chance, another on either side of the head."""
+    _, first, place = np.unique(np.round(points / TIE), axis=0, return_index=True, return_inverse=True)
+    place = place.ravel()
+    mean = np.stack([np.bincount(place, normal[:, axis]) for axis in range(3)], axis=1)
+    size = np.linalg.norm(mean, axis=1)
+    known = size > TIE
+    least = np.full(len(first), kind.max(initial=0))
+    np.minimum.at(least, place, kind)
+    return points[first[known]], mean[known] / size[known, None], least[known]
 
 
 def _buried(points, normal, kind, spacing):
