@@ -11,9 +11,10 @@ from pathlib import Path
 
 import numpy as np
 
+from ...sim.adapt.closest import Surface
 from ...sim.anatomy.head import Eye, Jaw, Muscle
 from ...sim.anatomy.muscle_bounds import bounded, eased
-from ...sim.anatomy.muscle_room import Room
+from ...sim.anatomy.muscle_room import Room, unit
 from ...sim.anatomy.muscle_shape import belly_mesh, belly_on, half_thickness
 from ...sim.mesh import Mesh
 from .muscles_layers import MERGE, Layers
@@ -25,6 +26,8 @@ from .skull_field import curve
 
 TABLE = Path(__file__).resolve().parents[1] / "tables" / "muscles.csv"
 MIRROR = np.array([-1.0, 1.0, 1.0])
+#: mm of skin over any vertex of a muscle: a `Room` of samples leaves less where skin turns into the lids' lining.
+LEAST_SKIN = 0.35
 
 
 def rows() -> list[dict[str, str]]:
@@ -59,7 +62,9 @@ class _Maker:
     def __init__(self, skin, groups, space, bones, eyes):
         self.eye = eyes[0]
         self.points = left_points(space, self.eye)
-        self.room = Room(skin, bones, np.asarray(groups["inner"]) > 0.5, [(e.centre, e.radius) for e in eyes])
+        inner = np.asarray(groups["inner"]) > 0.5
+        self.seen = Surface(skin.vertices, skin.triangles[~inner[skin.triangles].all(axis=1)])
+        self.room = Room(skin, bones, inner, [(e.centre, e.radius) for e in eyes])
         self.tissue = Tissue(self.room, skin, groups)
         self.points.update(self.tissue.lower_end())
         self.layers = Layers()
@@ -140,7 +145,7 @@ class _Maker:
                 fibres = self.eased(row, fibres, keep, ring)
                 if row["paired"] != "1":
                     fibres = _symmetric(fibres, row)
-        shape = belly_mesh(belly)
+        shape = self._under_skin(belly_mesh(belly))
         if row["paired"] == "1":
             return fibres, shape
         columns, stations = belly.top.shape[:2]
@@ -151,6 +156,12 @@ class _Maker:
             turn = np.concatenate([np.arange(columns)[::-1], np.arange(columns, 2 * columns - 2)[::-1]])
             other = rings[:, turn]
         return fibres, shape.moved(((rings + other * MIRROR) / 2).reshape(-1, 3))
+
+    def _under_skin(self, shape):
+        """``shape`` with what lies nearer than `LEAST_SKIN` under the skin one sees, beside the lids' edges, moved off it."""
+        skin = self.seen.closest(shape.vertices)
+        off = unit(shape.vertices - skin.points)
+        return shape.moved(shape.vertices + np.clip(LEAST_SKIN - skin.distance, 0, None)[:, None] * off)
 
     def _name_nodes(self, row, fibres):
         """Let others end in this muscle: the lips' fibres and the outermost of the lids' rings."""

@@ -16,7 +16,7 @@ from ...sim.anatomy.head import SurfacePoints
 from ...sim.mesh import Mesh
 from ...sim.mesh_subdivision import drawn
 from .skin import make_skin
-from .skin_bust import bust_columns, place_bust
+from .skin_bust import bust_between, bust_columns, place_bust
 from .skin_fit import fit_skin, outer_skin
 from .skin_groups import skin_groups
 from .skin_heads import SHARES, first_head, heads
@@ -56,7 +56,8 @@ def _lower_vault(vertices: np.ndarray, floor: float, share: float = 0.92) -> np.
 
 def _average(layout, fits, mean: np.ndarray) -> np.ndarray:
     """Mean (n, 3) of fits (subject, vertices, known), each laid on the last mean by its known part; symmetric."""
-    outer, bust = outer_skin(layout), bust_columns(layout)[:, 1:]
+    outer = outer_skin(layout)
+    bust = np.concatenate([bust_columns(layout)[:, 1:].ravel(), bust_between(layout)[0]])
     for last in (False, False, True):
         total, weight = np.zeros_like(mean), np.zeros((len(mean), 1))
         for subject, vertices, known in fits:

@@ -19,7 +19,7 @@ from .skin_thinning import COLUMN_THINNINGS, ROW_THINNINGS
 HALF = 24
 
 #: Rows of vertices; row 0 borders the crown patch, the last is the open edge of the bust.
-ROWS = 36
+ROWS = 35
 
 #: Cells along one side of the crown patch.
 CROWN = 8

@@ -31,7 +31,7 @@ BRUSHES = (
     ("cricoid cartilage and windpipe", [(0, -9, -134), (0, -3, -146)], 2.0, 7.0),
     ("suprasternal notch", [(0, 2, -156), (0, 2, -163)], -5.0, 7.5),
     ("collar bone", [(15, 1, -169), (34, 3, -169), (55, 14, -164), (71, 30, -152), (78, 42, -143)], 3.4, 6.0),
-    ("under the collar bone", [(40, 3, -183), (62, 10, -178), (76, 22, -168)], -2.0, 7.0),
+    ("under the collar bone", [(40, 3, -183), (62, 10, -178), (76, 22, -168)], -3.6, 7.0),
     ("breastbone", [(0, 0, -180), (0, -4, -192)], -1.2, 8.0),
 )
 
@@ -56,7 +56,7 @@ def _upright(points: np.ndarray) -> np.ndarray:
 
 
 def _longer_bust(layout: Layout, x: np.ndarray) -> None:
-    """The rows of the bust spread over more of the shoulders (left side and midline)."""
+    """The rows of the bust spread, evenly, over more of the shoulders (left side and midline)."""
     columns = bust_columns(layout)[:, 2:]
     more = np.interp(np.arange(len(columns)), [0, 8, 16], _BUST_LONGER)
     for column, extra in zip(columns, more, strict=True):
@@ -65,11 +65,11 @@ def _longer_bust(layout: Layout, x: np.ndarray) -> None:
         ahead[2] *= 0.6 if abs(ahead[0]) > 3 else 1.0
         path = np.concatenate([path, path[-1:] + extra * ahead / np.linalg.norm(ahead)])
         length = np.r_[0, np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))]
-        at = length[:-1] * length[-1] / length[-2]
+        at = np.linspace(0, length[-1], len(column))
         x[column] = np.stack([np.interp(at, length, path[:, k]) for k in range(3)], axis=1)
 
 
-def _even_throat(layout: Layout, x: np.ndarray, length: float = 14.0) -> np.ndarray:
+def _even_throat(layout: Layout, x: np.ndarray, length: float = 13.0) -> np.ndarray:
     """Where the rows under the jaw thin out toward the neck the surface is freed of their unevenness."""
     weight = np.zeros(layout.count)
     vertex, column, row = layout.places()
@@ -77,6 +77,14 @@ def _even_throat(layout: Layout, x: np.ndarray, length: float = 14.0) -> np.ndar
         abs(column), [11, 14], [1, 0.3]
     )
     return fair(layout, x, weight, length)
+
+
+def _even_joint(layout: Layout, x: np.ndarray, length: float = 4.5) -> np.ndarray:
+    """Where the columns of the neck thin out (rows 29 and 30) what the brushes left uneven is smoothed."""
+    weight = np.zeros(layout.count)
+    vertex, _, row = layout.places()
+    weight[vertex] = np.interp(row, [28, 29, 31, 32], [0, 1, 1, 0])
+    return np.where(weight[:, None] > 0, fair(layout, x, weight, length), x)
 
 
 def _to_line(points: np.ndarray, line: np.ndarray) -> np.ndarray:
@@ -106,3 +114,4 @@ def finish_neck(layout: Layout, x: np.ndarray) -> None:
     out[inside] = 0
     out[layout.edge] = 0
     x += out[:, None] * normal
+    x[:] = _even_joint(layout, both_sides(x[layout.left]))

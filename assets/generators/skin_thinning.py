@@ -87,8 +87,8 @@ ROW_THINNINGS = (
     *(RowThinning(20, 6), RowThinning(19, 9), RowThinning(20, 12)),
 )
 
-#: Up to the crown and down the neck: 48 columns become 32.
+#: Up to the crown, and down the neck from below the crease of the throat on: 48 columns become 32.
 COLUMN_THINNINGS = (
     *(ColumnThinning(u, 1, -1) for u in (1, 5, 9, 13)),
-    *(ColumnThinning(u, 27, 1) for u in (1, 5, 9, 13)),
+    *(ColumnThinning(u, 29, 1) for u in (1, 5, 9, 13)),
 )

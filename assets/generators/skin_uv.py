@@ -22,7 +22,7 @@ FACE_GAIN = 2.4
 #: The same on the auricle, whose folds would shrink otherwise.
 EAR_GAIN = 1.35
 
-#: The same below the neck.
+#: The same below the jaw.
 BUST_GAIN = 0.6
 
 
@@ -66,7 +66,7 @@ def _left_half(layout: Layout, vertices: np.ndarray, faces: np.ndarray) -> np.nd
     flat = mean_value(points, triangles, np.array(list(outline)), np.array(list(outline.values())))
     on_line = np.unique(np.r_[front, below])
     forward = np.clip(-points[triangles].mean(axis=1)[:, 1] / 60 + 0.2, 0, 1)
-    trunk = np.interp(points[triangles].mean(axis=1)[:, 2], [-150, -100], [BUST_GAIN, 1])
+    trunk = np.interp(points[triangles].mean(axis=1)[:, 2], [-115, -95], [BUST_GAIN, 1])
     gain = (1 + (FACE_GAIN - 1) * forward) * trunk
     gain[np.isin(triangles, layout.rings["ear_l"][1:]).any(axis=1)] *= EAR_GAIN
     weight = 1 + 3 * forward  # openings take the shape that suits their surroundings

@@ -21,7 +21,7 @@ from ..mesh_unfolding import unfolded
 from .eyeball import reach
 from .head import Eye, Head
 
-TURNS = 4  # of smoothing and unfolding, one after the other
+TURNS = 16  # at most, of smoothing and unfolding, one after the other
 SHUT = 1.5  # mm: lids whose margins are nowhere farther apart are shut
 CLOSED = 3.0  # mm: so are lips, which closed heads have up to 1.7 mm apart there
 

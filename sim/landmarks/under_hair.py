@@ -40,7 +40,7 @@ NEAR_EAR = 8.0  # mm from an ear that is guessed to one that is seen
 #: than .67.
 FOUND = 0.85
 WITH_EARS = 60.0  # mm about an ear under hair that is under hair as well, outside of the face
-EDGE = -8.0  # mm from the outline of a face that is read from hair beside it, within which it is face
+EDGE = -1.0  # mm from the outline of a face that is read from hair beside it, within which it is face
 INNER = -20.0  # mm from that outline within which no hair led the fit astray
 OFF = 4.0  # mm by which hair stands off there
 #: Rounds of a fit that tells of the scalp, as in `shape_fit.SCHEDULE`. What a face has of its own to a millimetre tells nothing
