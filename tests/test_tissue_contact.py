@@ -107,6 +107,15 @@ def test_nothing_touches_at_rest(reference_model):
     np.testing.assert_array_equal(cleared(reference_model, pose, x), x)
 
 
+def test_a_way_out_that_leads_deeper_in_is_not_taken(reference_model, monkeypatch):
+    x = rest_state(reference_model).positions
+    pose = pose_of(reference_model, control(reference_model, Pose()))
+    inward = np.zeros((reference_model.count, 3))
+    inward[reference_model.contacts.lip_lower] = [0, 0, 0.5]
+    monkeypatch.setattr("headshop.sim.tissue.clearing.way_out", lambda planes, positions, free: inward)
+    np.testing.assert_array_equal(cleared(reference_model, pose, x), x)
+
+
 @pytest.fixture(scope="module")
 def ruler(reference, reference_model):
     return Ruler(reference, reference_model, pose_of(reference_model, control(reference_model, Pose())))

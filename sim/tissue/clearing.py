@@ -62,7 +62,7 @@ def surfaces_of(model: Model, pose, positions, off_bone: float = 0.0) -> dict:
 
 def cleared(model: Model, pose, positions) -> np.ndarray:
     """(3 n, 3) mm: ``positions`` with the drawn skin out of eyeballs, teeth, gums and the other lip, flesh between
-    skin and lining, fascia out of bone, and shut lids met."""
+    skin and lining, fascia out of bone, and shut lids met; as after the round that left the least."""
     out = met(model, pose.shut, positions)
     n = model.count
     skin, least = out[:n], np.inf
