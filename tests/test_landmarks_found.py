@@ -105,7 +105,7 @@ def test_what_a_damaged_scan_inside_out_does_not_show_is_in_mid_air_and_unsure(p
     assert "op" not in found.sure() and "prn" in found.sure()
 
 
-@pytest.mark.parametrize("seed", [1115, 1815, 4, 20])
+@pytest.mark.parametrize("seed", [1115, 1815, 4])
 def test_a_small_head_cut_off_above_the_brows_is_found_in_any_turn(reference, shared, seed):
     mesh, turn, shift = _turned(clean_scan(read_ply(shared / "ct_headsq" / "skin.ply"))[0], seed)
     found = finish(find_landmarks(mesh, reference))
