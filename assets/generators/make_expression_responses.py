@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Simulate jaw and muscles one by one on the reference head: ``assets/tables/expression_responses.npz``.
 
+Where it is known how people's skin moves (`sim.relax.movement`), the table holds the mean of that and the simulation.
+
 ``python -m headshop.assets.generators.make_expression_responses`` after the reference head or the tissue has changed.
 """
 
@@ -9,15 +11,19 @@ import sys
 
 import numpy as np
 
+from ...sim.acting.expressions import expressions
 from ...sim.acting.pose import Pose, control
+from ...sim.adapt.skin_fit import landmark_rows
 from ...sim.anatomy.storage import REFERENCE, load_head, write_atomically
 from ...sim.relax.bunching import fleshed
-from ...sim.relax.responses import MUSCLES, OPENINGS, TABLE, UNPAIRED, mirrored_vertices
+from ...sim.relax.movement import RAISED, measured, of_left, with_measured
+from ...sim.relax.responses import MUSCLES, OPENINGS, TABLE, UNPAIRED, both_sides, mirrored_vertices
 from ...sim.tissue.model import build_model
 from ...sim.tissue.solver import rest_state, solve
 
 ITERATIONS = 300
 BROW = "orbicularis_oculi_orbital"  # what raises cheeks is its lower half, which acts alone; its upper lowers brows
+PARTED = 0.5  # opening of the jaw at which the lips' points are told apart
 STILL = 0.02  # mm: what moves less stays, so that the table packs well
 
 
@@ -36,12 +42,25 @@ def main(argv: list[str]) -> int:
     jaw = [moved(Pose(jaw_open=opening)) for opening in OPENINGS]
     muscles = [moved(Pose({name if name in UNPAIRED else f"{name}_l": 1.0})) for name in MUSCLES]
     muscles[MUSCLES.index(BROW)] *= below_eyes(head)[:, None]
+    mirror = mirrored_vertices(head.skin.vertices)
+    known = measured(head, head.skin.vertices + jaw[OPENINGS.index(PARTED)])
+    joy = expressions()["joy"].muscles
+    names, fields = both_sides(muscles, mirror)
+    smile = sum(
+        joy.get(name, 0.0) * field for name, field in zip(names, fields, strict=True) if not name.startswith(BROW)
+    )
+    raised = of_left(head, known["AU6"]) * below_eyes(head)[:, None] * RAISED / joy[f"{BROW}_l"]
+    muscles[MUSCLES.index(BROW)] = with_measured(head, muscles[MUSCLES.index(BROW)], raised)
+    chin = landmark_rows(head.landmarks, ["gn"], len(rest))
+    as_far = [np.linalg.norm(chin @ field) / np.linalg.norm(chin @ known["AU27"]) for field in jaw]
+    jaw = [with_measured(head, field, share * known["AU27"]) for field, share in zip(jaw, as_far, strict=True)]
     stream = io.BytesIO()
     np.savez_compressed(
         stream,
         jaw=np.array(jaw, dtype=np.float16),
         fields=np.array(muscles, dtype=np.float16),
-        mirror=mirrored_vertices(head.skin.vertices),
+        smile=np.array(with_measured(head, smile, known["AU12"]) - smile, dtype=np.float16),
+        mirror=mirror,
     )
     write_atomically(argv[0] if argv else TABLE, stream.getvalue())
     return 0

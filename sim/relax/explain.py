@@ -28,7 +28,7 @@ OPEN = 1.0  # opening of the jaw that shrinkage expects
 PART = 0.07
 SMILE = 2.0  # strength of a smile, by the joy of the table of expressions, that it expects
 ALONE = 0.7  # contraction of a muscle beyond its share in the smile
-UNEVEN = 0.15  # difference between the sides
+UNEVEN = 0.4  # difference between the sides
 ROUNDS = 3
 
 
@@ -84,9 +84,12 @@ def explain(
         rows = vstack([rows, told.rows]).tocsr()
         y, noise = np.append(y, told.moves), np.append(noise, told.deviations)
         people = np.pad(people, (0, told.moves.size))
+    smiles = told is not None and told.smiles
+    shrink = shrinkage([table.names[k] for k in pick], smiles)
+    # The strength of a smile moves the skin by what people's do beyond our muscles; in other faces it only ties these.
+    fields = np.concatenate([fields, table.smile[None] * smiles])
     sampled = np.stack([(rows @ field).ravel() for field in fields], axis=1)
-    shrink = shrinkage([table.names[k] for k in pick], told is not None and told.smiles)
-    opening, contraction = 0.2, np.full(len(pick), 0.3)
+    opening, contraction = 0.2, np.full(len(fields), 0.3)
     for _ in range(ROUNDS):
         others = unlike(table, fields, vertices, jaw, opening, contraction)
         factor = cho_factor(people + others.covariance(rows) + np.diag(noise**2), lower=True)
@@ -94,13 +97,12 @@ def explain(
         by_jaw = (rows @ table.jaw_at(step)).ravel() / step
         system = solve_triangular(factor[0], np.column_stack([by_jaw, sampled]), lower=True)
         right = solve_triangular(factor[0], y, lower=True)
-        system = np.column_stack([system, np.zeros(len(system))])  # the smile has no field but its muscles'
         found, _ = nnls(np.concatenate([system, shrink]), np.concatenate([right, np.zeros(len(shrink))]))
-        opening, contraction = float(found[0]), found[1:-1]
+        opening, contraction = float(found[0]), found[1:]
     modelled = table.jaw_at(opening) + np.einsum("k,knj->nj", contraction, fields)
     left = y - by_jaw * opening - sampled @ contraction
     beyond = (others.covariance(None, rows) @ cho_solve(factor, left)).reshape(-1, 3)
-    muscles = {table.names[k]: float(a) for k, a in zip(pick, contraction, strict=True)}
+    muscles = {table.names[k]: float(a) for k, a in zip(pick, contraction[:-1], strict=True)}
     return Expression(opening, muscles, modelled + beyond, modelled)
 
 

@@ -92,10 +92,10 @@ def relaxed(reference: Head, skin, fitted, unseen=None, teeth=()) -> Relaxed:
     found = explain(table, cage, reference.jaw, rows, offsets, people, noise, muscles, known)
     told = told_of_smile(reference, table, as_drawn, lip, found.jaw)
     gap = lip_gap(rest, skin)
-    lift = lifted(told, table, found)
-    smiling = lift > SMILE
+    lifts = lifted(told, table, found)
+    smiling = bool(lifts.mean() > SMILE)
     if smiling:
-        told = told_of_smile(reference, table, as_drawn, lip, found.jaw, lift)
+        told = told_of_smile(reference, table, as_drawn, lip, found.jaw, lifts)
         found = explain(table, cage, reference.jaw, rows, offsets, people, noise, of_smile, known, told)
     elif gap < ROUNDED * np.linalg.norm(np.subtract(*landmark_rows(reference.landmarks, CORNERS, n) @ now)):
         told = told_of_jaw(told, table, found.jaw)
@@ -108,7 +108,7 @@ def relaxed(reference: Head, skin, fitted, unseen=None, teeth=()) -> Relaxed:
     report = {
         "jaw_degrees": float(np.degrees(found.jaw * reference.jaw.open_max)),
         "smiles": smiling,
-        "smile": round(lift, 3),
+        "smile": round(float(lifts.mean()), 3),
         "muscles": {name: round(found.muscles[name], 3) for name in strongest if found.muscles[name] >= 0.05},
         "lips_apart_mm": gap,
         "upper_teeth_seen": meet is not None,

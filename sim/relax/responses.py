@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How the reference's skin answers its jaw and the muscles of the lower face, from our own simulation.
+"""How the reference's skin answers its jaw and the muscles of the lower face, from our own simulation and people's movement.
 
 The table ``assets/tables/expression_responses.npz`` is made by ``assets/generators/make_expression_responses.py``.
 """
@@ -41,11 +41,13 @@ MOUTH = tuple(name for name in MUSCLES if not name.startswith("orbicularis_oculi
 
 @dataclass(frozen=True, eq=False)
 class Responses:
-    """names : muscles with their sides; fields (k, n, 3) mm at full contraction; jaw (o, n, 3) mm at `OPENINGS`."""
+    """names : muscles with their sides; fields (k, n, 3) mm at full contraction; jaw (o, n, 3) mm at `OPENINGS`;
+    smile (n, 3) mm : what people's smiles do beyond our muscles' at theirs in joy."""
 
     names: tuple[str, ...]
     fields: np.ndarray
     jaw: np.ndarray
+    smile: np.ndarray
 
     def jaw_at(self, opening: float) -> np.ndarray:
         """(n, 3) mm that the skin moves when the jaw opens by ``opening`` (0..1), along straight lines between those
@@ -67,7 +69,12 @@ class Responses:
 def responses(path=TABLE) -> Responses:
     """The table, with the right side's muscles mirrored from the left's."""
     with np.load(path, allow_pickle=False) as table:
-        jaw, fields, mirror = table["jaw"].astype(float), table["fields"].astype(float), table["mirror"]
+        jaw, fields, smile = (table[name].astype(float) for name in ("jaw", "fields", "smile"))
+        return Responses(*both_sides(fields, table["mirror"]), jaw, smile)
+
+
+def both_sides(fields, mirror) -> tuple[tuple[str, ...], np.ndarray]:
+    """Names with sides, and the fields (k, n, 3), of all muscles from those of `MUSCLES`, whose right side is mirrored."""
     names, out = [], []
     for name, field in zip(MUSCLES, fields, strict=True):
         if name in UNPAIRED:
@@ -76,7 +83,7 @@ def responses(path=TABLE) -> Responses:
         else:
             names += [f"{name}_l", f"{name}_r"]
             out += [field, field[mirror] * [-1, 1, 1]]
-    return Responses(tuple(names), np.array(out), jaw)
+    return tuple(names), np.array(out)
 
 
 def answers(reference: Head) -> bool:

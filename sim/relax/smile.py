@@ -24,34 +24,37 @@ WIDER, RISE, SHORTER = 0.27, np.radians(47), 0.28
 #: or of 1.9 mm along each axis; a little of it is known from how strong the smile seems.
 DEVIATION = 1.8
 #: How much of a smile that seems weaker or stronger than others is believed: a face as such may look like that.
-HEEDED = 0.33
+HEEDED = 0.66
 UNTOLD = 1e3  # mm: nothing is known along that axis
 NOSE = ("al_l", "al_r", "sn")
 BROADER = 0.14
 #: mm by which a wing's way aside, and the base's, differ from person to person (our own estimates).
 WINGS, BASE = 1.0, 1.5
-SMILE = 0.33  # share of a smile's lift of the corners from which on an expression is one
+SMILE = 0.2  # share of a smile's lift of the corners from which on an expression is one
 
 
-def told_of_smile(reference: Head, table: Responses, drawn_rows, lip: int, opening: float, lift: float = 1.0) -> Told:
+def told_of_smile(reference: Head, table: Responses, drawn_rows, lip: int, opening: float, lifts=(1.0, 1.0)) -> Told:
     """What is `Told` of the reference's skin when it smiles.
 
     drawn_rows (n, n) sparse : gives the skin as drawn from its vertices
     lip : the vertex in the middle of the upper lip, where it meets the lower one
-    opening : the jaw's, 0..1; lift : how far it seems to lift the corners (`lifted`), of what smiles do
+    opening : the jaw's, 0..1; lifts : how far it seems to lift the left and the right corner (`lifted`), of what smiles do
     """
-    strength = 1 + HEEDED * (lift - 1)
+    sides = 1 + HEEDED * (np.asarray(lifts) - 1)
+    strength = sides.mean()
     n = drawn_rows.shape[0]
     marks = reference.landmark_positions()
-    out = strength * WIDER * np.linalg.norm(marks["ch_l"] - marks["ch_r"]) / 2
+    out = WIDER * np.linalg.norm(marks["ch_l"] - marks["ch_r"]) / 2
     up = strength * SHORTER * (marks["sn"] - marks["sto"])[2]
     middle = csr_matrix(([1.0], ([0], [lip])), shape=(1, n))
     corners, nose = (landmark_rows(reference.landmarks, names, n) for names in (CORNERS, NOSE))
     rows = (vstack([corners, middle, nose]) @ drawn_rows).tocsr()
     rise = out * np.tan(RISE)
-    corner = np.array([out, rise + (rows[:1] @ table.jaw_at(opening))[0, 1], rise])
+    jaw_back = (rows[: len(CORNERS)] @ table.jaw_at(opening))[:, 1]
+    at_corners = sides[:, None] * np.array([[out, rise, rise], [-out, rise, rise]])
+    at_corners[:, 1] += jaw_back
     aside = strength * BROADER * np.linalg.norm(marks["al_l"] - marks["al_r"]) / 2
-    moves = [corner, corner * [-1, 1, 1], [0, 0, up], [aside, 0, 0], [-aside, 0, 0], [0, 0, 0]]
+    moves = [*at_corners, [0, 0, up], [aside, 0, 0], [-aside, 0, 0], [0, 0, 0]]
     mouth = [[DEVIATION] * 3] * 2 + [[UNTOLD, UNTOLD, DEVIATION]]
     nose = [[WINGS, UNTOLD, UNTOLD]] * 2 + [[UNTOLD, BASE, BASE]]
     return Told(rows, np.array(moves), np.array(mouth + nose), smiles=True)
@@ -63,10 +66,9 @@ def told_of_jaw(told: Told, table: Responses, opening: float) -> Told:
     return Told(rows, rows @ table.jaw_at(opening), np.full((len(CORNERS), 3), DEVIATION))
 
 
-def lifted(told: Told, table: Responses, found: Expression) -> float:
-    """How far an expression, as ``found`` without knowing, lifts the corners of the mouth: the share of the smile that is
-    ``told`` of; the jaw that opens lowers them."""
+def lifted(told: Told, table: Responses, found: Expression) -> np.ndarray:
+    """(2,) how far an expression, as ``found`` without knowing, lifts the left and the right corner of the mouth: the share
+    of the smile that is ``told`` of; the jaw that opens lowers them."""
     jaw, moved = (told.rows @ field for field in (table.jaw_at(found.jaw), found.displacement))
     corners = slice(0, len(CORNERS))
-    lift, full = ((moves - jaw)[corners, 2].mean() for moves in (moved, told.moves))
-    return float(lift / full)
+    return (moved - jaw)[corners, 2] / (told.moves - jaw)[corners, 2].mean()

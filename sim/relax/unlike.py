@@ -16,7 +16,7 @@ from ..tissue.jaw import jaw_transform
 from .responses import Responses
 
 #: Deviation as a share of what our muscles do: to any side, and more or less of the same.
-ASIDE, ALONG = 0.4, 0.4
+ASIDE, ALONG = 0.25, 0.25
 RIGID = 0.15  # the same of what follows the jaw as a whole
 #: Its reaches in mm with their shares of the variance.
 REACHES = ((12.0, 0.3), (6.0, 0.7))

@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How skin moves in people: measured at some points of it, and the skin between.
+
+Our tissue draws a smile's corners too much upward and too little aside and back, and lifts cheeks less than people do
+(Freytag et al. 2022, Aesthet. Surg. J. 42:1-9: 6.7 +- 2.4 mm in the medial midface). Where such movement is known it counts
+as much as the simulation does (`HALF`): of a cheek that is raised, corners of the mouth that are pulled, and a jaw that opens.
+
+The table ``assets/tables/skin_movement.csv``, by ``assets/generators/skin_movement.py``, names its source.
+"""
+
+from pathlib import Path
+
+import numpy as np
+from scipy.interpolate import RBFInterpolator
+from scipy.sparse import identity
+from scipy.sparse.linalg import spsolve
+
+from ..adapt.rest import rest_of
+from ..adapt.smooth_system import laplacian
+from ..anatomy.head import Head
+
+TABLE = Path(__file__).resolve().parents[2] / "assets" / "tables" / "skin_movement.csv"
+
+#: Action units of the table, each of both sides at its full (Ekman, Friesen and Hager 2002).
+UNITS = ("AU6", "AU12", "AU27")
+HALF = 0.5
+#: The raising of the cheeks that goes with a full pull at the corners, in happiness: 0.6 to 0.8 (EMFACS, 6 and 12).
+RAISED = 0.75
+OFF_LIPS = 2.0  # mm from the edges of the lips, which lie on each other: nearer points may belong to either
+ROUGH = 0.1  # how little the skin between bends to the points
+INWARD = 4.0  # edges behind the seen skin over which a difference of the two fades
+MIDLINE = 10.0  # mm beside it over which one side's muscle loses its say
+
+
+def read_movement(path=TABLE) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """Points (k, 3) mm on the left half of the reference's skin, and unit -> (k, 3) mm that they move."""
+    table = np.loadtxt(path, delimiter=",", skiprows=2, dtype=float)
+    return table[:, :3], {unit: table[:, 3 + 3 * k : 6 + 3 * k] for k, unit in enumerate(UNITS)}
+
+
+def measured(head: Head, parted: np.ndarray) -> dict[str, np.ndarray]:
+    """Unit -> (n, 3) mm that the skin of the reference moves.
+
+    parted (n, 3) mm : its vertices with the lips apart, so that what moves one lip does not move the other
+    """
+    rest = rest_of(head)
+    vertices = head.skin.vertices
+    points, moves = read_movement()
+    seen = np.flatnonzero(~rest.inner)
+    rim = vertices[rest.lip_rim]
+    keep = np.linalg.norm(points[:, None] - rim, axis=2).min(axis=1) > OFF_LIPS
+    points = points[keep]
+    at = parted[seen[np.linalg.norm(points[:, None] - vertices[seen], axis=2).argmin(axis=1)]]
+    aside = at[:, 0] > 0.5
+    both = np.concatenate([at, at[aside] * [-1, 1, 1]])
+    out = {}
+    for unit, way in moves.items():
+        way = way[keep]
+        way = np.concatenate([np.where(aside[:, None], way, way * [0, 1, 1]), way[aside] * [-1, 1, 1]])
+        out[unit] = RBFInterpolator(both, way, smoothing=ROUGH)(parted)
+    return out
+
+
+def of_left(head: Head, field) -> np.ndarray:
+    """(n, 3) mm of what only the left side's muscle moves, of a ``field`` of both sides."""
+    return np.clip(0.5 + head.skin.vertices[:, :1] / (2 * MIDLINE), 0, 1) * field
+
+
+def with_measured(head: Head, simulated, known) -> np.ndarray:
+    """The mean (n, 3) mm of a ``simulated`` field and what is ``known`` of it, each (n, 3) mm.
+
+    Inside mouth, lids and nostrils, where nothing is known, the difference fades.
+    """
+    rest = rest_of(head)
+    off = np.where(rest.inner[:, None], 0.0, HALF * (np.asarray(known) - simulated))
+    inner = np.flatnonzero(rest.inner)
+    bend = (laplacian(head.skin.vertices, head.skin.faces) + identity(len(off)) / INWARD**2).tocsr()[inner]
+    off[inner] = spsolve(bend[:, inner].tocsc(), -(bend @ off))
+    return simulated + off
