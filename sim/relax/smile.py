@@ -30,7 +30,7 @@ NOSE = ("al_l", "al_r", "sn")
 BROADER = 0.14
 #: mm by which a wing's way aside, and the base's, differ from person to person (our own estimates).
 WINGS, BASE = 1.0, 1.5
-SMILE = 0.2  # share of a smile's lift of the corners from which on an expression is one
+SMILE = 0.24  # share of a smile's lift of the corners from which on an expression is one
 
 
 def told_of_smile(reference: Head, table: Responses, drawn_rows, lip: int, opening: float, lifts=(1.0, 1.0)) -> Told:
