@@ -12,8 +12,9 @@ import shutil
 import numpy as np
 import pytest
 
-from headshop.assets.generators import make_reference_head, make_strengths
+from headshop.assets.generators import make_expression_responses, make_reference_head, make_strengths
 from headshop.sim.anatomy.storage import REFERENCE, anatomy_document, load_head
+from headshop.sim.relax.responses import TABLE
 from headshop.sim.tissue.model import STRENGTHS
 
 pytestmark = pytest.mark.skipif(
@@ -55,3 +56,13 @@ def test_the_strengths(tmp_path, monkeypatch):
     np.testing.assert_allclose(numbers(new), numbers(old), rtol=0.01, atol=0.01)
     if EXACT:
         assert copy.read_bytes() == STRENGTHS.read_bytes()
+
+
+def test_the_responses(tmp_path):
+    assert make_expression_responses.main([str(tmp_path / "responses.npz")]) == 0
+    with np.load(tmp_path / "responses.npz") as new, np.load(TABLE) as old:
+        assert set(new.files) == set(old.files)
+        for name in old.files:
+            np.testing.assert_allclose(new[name].astype(float), old[name].astype(float), atol=0.1, err_msg=name)
+    if EXACT:
+        assert (tmp_path / "responses.npz").read_bytes() == TABLE.read_bytes()

@@ -11,7 +11,7 @@ from headshop.sim.acting.expressions import expressions
 from headshop.sim.adapt.rest import rest_of
 from headshop.sim.mesh_subdivision import drawn
 from headshop.sim.relax import relaxed as relaxing
-from headshop.sim.relax.movement import HALF, UNITS, measured, of_left, read_movement, with_measured
+from headshop.sim.relax.movement import HALF, RAISED, UNITS, measured, of_left, read_movement, with_measured
 from headshop.sim.relax.responses import responses
 from headshop.sim.scan.individual import draw_field
 
@@ -69,6 +69,15 @@ def test_half_of_it_is_known_and_fades_inward(reference, known):
     left = of_left(reference, known["AU6"])
     side = reference.skin.vertices[:, 0]
     assert not left[side < -15].any() and np.array_equal(left[side > 15], known["AU6"][side > 15])
+
+
+def test_cheeks_rise_as_far_as_was_measured_elsewhere(reference, known):
+    """Freytag et al. 2022: the skin of the medial midface rises by 6.7 +- 2.4 mm in a smile, in 21 people."""
+    at, marks = reference.skin.vertices, reference.landmark_positions()
+    medial = (reference.groups["cheek_l"] > 0.5) & (at[:, 0] < marks["ex_l"][0])
+    medial &= (at[:, 2] < marks["or_l"][2]) & (at[:, 2] > marks["ch_l"][2])
+    smile = known["AU12"] + RAISED * known["AU6"]
+    assert smile[medial, 2].mean() == pytest.approx(6.7, abs=2.4)
 
 
 def test_a_smile_draws_the_corners_aside_and_back(reference):

@@ -30,7 +30,9 @@ from .skin_layout import skin_layout
 GAP, LIP_GAP, FAR_GAP = 15.0, 6.0, 40.0
 MOVES = 0.3  # mm
 MOUTH = 14.0  # mm around the lips' edges
-SOURCE = "ICT-FaceKit (MIT; Li et al. 2020, CVPR): its mean head, action units alone at their full, read off at points of our skin"
+SOURCE = (
+    "ICT-FaceKit (MIT; Li et al. 2020, CVPR): its mean head, action units alone at full, read off at points of our skin"
+)
 
 
 def movement(folder: Path) -> tuple[np.ndarray, np.ndarray]:
