@@ -24,7 +24,7 @@ TABLE = Path(__file__).resolve().parents[2] / "assets" / "tables" / "skin_moveme
 #: Action units of the table, each of both sides at its full (Ekman, Friesen and Hager 2002).
 UNITS = ("AU6", "AU12", "AU27")
 HALF = 0.5
-#: The raising of the cheeks that goes with a full pull at the corners, in happiness: 0.6 to 0.8 (EMFACS, 6 and 12).
+#: The raising of the cheeks that goes with a full pull at the corners: 0.6 to 0.8 in happiness, 6 + 12 of EMFACS (an estimate).
 RAISED = 0.75
 OFF_LIPS = 2.0  # mm from the edges of the lips, which lie on each other: nearer points may belong to either
 ROUGH = 0.1  # how little the skin between bends to the points
