@@ -384,5 +384,5 @@ def test_smiling_subjects(shared, reference, name):
     seen = (reference.groups["face"] > 0.5) & (reference.groups["inner"] < 0.5)
     far = np.linalg.norm(reference.skin.vertices - reference.landmark_positions()["sto"], axis=1) > 45
     distance = surface.closest(drawn(reference.skin.faces, result.skin)[seen & far], 20.0).distance
-    assert distance.mean() < 0.35 and np.percentile(distance, 95) < 1.2
+    assert distance.mean() < 0.3 and np.percentile(distance, 95) < 1.0
     assert result.report["smiles"]
