@@ -13,7 +13,7 @@ from headshop.sim.landmarks.pose_search import Pose
 from headshop.sim.landmarks.shape_fit import REST, Expression, fit_shape
 from headshop.sim.landmarks.shape_space import shape_space
 from headshop.sim.landmarks.under_hair import HARDLY, LOOSE, fit_under_hair, without_moved
-from headshop.sim.mesh import Mesh
+from headshop.sim.mesh import Mesh, vertex_normals
 from headshop.sim.mesh_subdivision import drawn
 from headshop.sim.progress import finish
 from headshop.sim.relax.responses import responses
@@ -69,6 +69,25 @@ def test_scalp_without_data_is_the_likeliest_heads(space, person, mask, referenc
     plain = Surface(reference.skin.vertices @ matrix.T + shift, reference.skin.triangles).closest(skin[scalp]).distance
     assert off.mean() < 5.0 and off.mean() < 0.6 * plain.mean()
     assert np.isin(np.flatnonzero(scalp), np.flatnonzero(np.isin(space.vertices, look.hidden))).mean() > 0.95
+
+
+def test_how_ears_are_shaped_tells_nothing_of_the_scalp_behind_them(space, person, mask, reference):
+    """Whose ears are thicker and stand off more has the same skull: it once swelled beside them, to a ridge."""
+    skin, marks = person
+    given = {n: p for n, p in marks.items() if n.partition("_")[0] not in SKULL}
+    ears = skin + 4.0 * space.ear[:, None] * vertex_normals(skin, space.triangles)
+    behind = space.hairy & (skin[:, 1] > marks["t_l"][1]) & (skin[:, 2] > marks["t_l"][2] + 5)
+    behind &= skin[:, 2] < marks["tr"][2] - 20
+    behind[behind] = ~Surface(skin, mask[0].triangles).closest(skin[behind], 25.0).found
+    assert behind.sum() > 10
+
+    def scalp(vertices):
+        scan = Mesh.from_triangles(vertices, mask[0].triangles)
+        filled = finish(first_look(reference, Surface(scan.vertices, scan.triangles), given)).filled
+        return filled.closest(skin[behind])
+
+    one, other = scalp(skin), scalp(ears)
+    assert np.linalg.norm(one.points - other.points, axis=1).max() < 4.0
 
 
 def test_a_head_built_of_a_mask_says_its_scalp_is_invented(space, person, mask, reference):

@@ -18,6 +18,8 @@ from .shape_space import ShapeSpace
 BEHIND, SEEN = 9.0, 3.0  # mm to which a thing hides skin behind it; from which on skin is not seen
 NO_DATA = 20.0  # mm from unseen scalp to the scan, at least
 TRUSTED = 0.3  # of `ShapeFit.trust`
+#: Of `ShapeSpace.ear`: from there on a place tells how this ear is shaped, not where the skin beside it lies.
+EARLESS = 0.05
 #: mm, of skin behind something, and of skin that nothing shows: how far about it is looked, and of heights their deviation and
 #: how far they go together.
 COVERED, UNSEEN = (30.0, 2.0, 9.0), (60.0, 4.0, 25.0)
@@ -57,7 +59,7 @@ def with_hidden_skin(space: ShapeSpace, fit: ShapeFit, hidden, left: Surface, he
     place, trust, _ = pairs(space, fit.points, left, 2 * SEEN * fit.pose.scale)
     near = cKDTree(space.points[used]).query(space.points * MIRROR)[0] < about
     near |= cKDTree(space.points[used]).query(space.points)[0] < about
-    known = np.flatnonzero(near & (trust > TRUSTED))
+    known = np.flatnonzero(near & (trust > TRUSTED) & (space.ear < EARLESS))
     off = np.einsum("ij,ij->i", place[known] - fit.points[known], normals[known])
     system = _alike(space.points[known], space.points[known], together)
     system[np.diag_indices_from(system)] += (ROUGH / spread) ** 2
