@@ -6,6 +6,7 @@ import pytest
 
 from headshop.sim.adapt.landmarks import read_landmarks
 from headshop.sim.anatomy.landmark_names import SKIN, mirrored
+from headshop.sim.errors import InputError
 from headshop.sim.landmarks import placed_face, verdict
 from headshop.sim.landmarks.find import find_landmarks
 from headshop.sim.landmarks.pose_search import Pose
@@ -145,25 +146,48 @@ def test_of_two_places_a_face_fits_as_well_the_likelier_shape_is_better(referenc
 
 
 @pytest.mark.parametrize(
-    "misfit, likeness, spread, face",
+    "misfit, likeness, spread, share, size, face",
     [
-        (1.0, 0.96, 0.5, True),
-        (1.3, 0.67, 0.6, True),  # hair down to the brows
-        (3.0, 0.77, 1.2, False),
-        (2.5, 0.77, 1.3, True),  # cut off, and with a tube in the mouth
-        (2.5, 0.70, 1.3, False),  # a bumpy ball
-        (2.0, 0.6, 0.8, False),  # a neck
-        (2.5, 0.74, 2.0, False),  # a tiny face on a nose
-        (3.9, 0.98, 0.3, True),  # nothing but eyes, nose and mouth
-        (5.5, 0.98, 0.3, False),
-        (1.0, 0.5, 0.1, False),
+        (1.0, 0.96, 0.5, 1.0, 1.0, True),
+        (1.3, 0.67, 0.6, 0.9, 1.0, True),  # hair down to the brows
+        (3.0, 0.77, 1.2, 0.6, 1.0, False),
+        (2.5, 0.77, 1.3, 0.7, 1.0, True),  # cut off, and with a tube in the mouth
+        (2.5, 0.70, 1.3, 0.7, 1.0, False),  # a bumpy ball
+        (2.0, 0.6, 0.8, 0.8, 1.0, False),  # a neck
+        (2.5, 0.74, 2.0, 0.8, 1.0, False),  # a tiny face on a nose
+        (3.9, 0.98, 0.3, 0.4, 1.0, True),  # nothing but eyes, nose and mouth
+        (5.5, 0.98, 0.3, 0.1, 1.0, False),
+        (1.0, 0.5, 0.1, 1.0, 1.0, False),
+        (2.7, 0.9, 1.3, 0.67, 0.89, True),  # seen from 28 degrees beside it
+        (3.4, 0.93, 1.04, 0.61, 0.77, True),  # a child seen from 34 degrees beside it
+        (4.9, 0.91, 1.05, 0.36, 0.81, False),  # a neck again
+        (3.1, 0.904, 1.18, 0.53, 0.98, False),  # a chin on a mouth
+        (1.3, 0.737, 2.0, 0.93, 0.7, False),  # the side of a head
+        (1.9, 0.714, 0.9, 0.75, 1.34, False),  # half a face, upside down
+        (2.0, 0.68, 0.75, 0.7, 1.15, True),  # the same, upright
     ],
 )
-def test_what_is_taken_for_a_face(reference, monkeypatch, misfit, likeness, spread, face):
+def test_what_is_taken_for_a_face(reference, monkeypatch, misfit, likeness, spread, share, size, face):
     monkeypatch.setattr(verdict, "misfit_of", lambda *_: misfit)
     monkeypatch.setattr(verdict, "likeness_of", lambda *_: likeness)
-    fit = ShapeFit(None, np.full(10, spread), None, None, None, None)
+    monkeypatch.setattr(verdict, "share_of", lambda *_: share)
+    fit = ShapeFit(None, np.full(10, spread), Pose(size, np.eye(3), np.zeros(3), 0.0), None, None, None)
     assert judged(reference, None, fit, 0.53).doubtful != face
+
+
+def test_where_there_are_only_flat_ends_no_face_is_found(reference):
+    """A box of a head's size: there none is looked for."""
+    across = np.linspace(-1.0, 1.0, 25)
+    u, v = (a.ravel() for a in np.meshgrid(across, across))
+    row, column = (a.ravel() for a in np.mgrid[:24, :24])
+    quads = 25 * row + column
+    quads = np.stack([quads, quads + 1, quads + 26, quads + 25], axis=1)
+    sides = [
+        np.roll(np.stack([np.full_like(u, s), s * u, v], axis=1), k, axis=1) for k in range(3) for s in (-1.0, 1.0)
+    ]
+    box = Mesh(np.concatenate(sides) * [75.0, 90.0, 120.0], np.concatenate([quads + 625 * k for k in range(6)]))
+    with pytest.raises(InputError, match="No face is found"):
+        finish(find_landmarks(box, reference))
 
 
 def test_a_crop_from_brows_to_lips_is_a_face(person, outside, reference):

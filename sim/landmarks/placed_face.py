@@ -16,7 +16,7 @@ from ..scan.face_match import face_template, surface_samples
 from ..scan.flat_cuts import beyond
 from .confidence import like_ears
 from .pose_search import LOOKING, STARTS, SURVIVORS, Pose, search_poses
-from .shape_fit import TRIAL, NoFaceError, ShapeFit, fit_shape
+from .shape_fit import LEAST, TRIAL, NoFaceError, ShapeFit, fit_shape
 from .shape_space import ShapeSpace
 from .verdict import judged, misfit_of
 
@@ -92,11 +92,13 @@ def place_face(mesh: Mesh, reference: Head, space: ShapeSpace, unit_scales) -> W
 def _trials(look, few, mesh, samples, template, scale) -> Work:
     """Work returning placements of the face in a mesh of ``scale`` mm per unit: misfit, scale, `ShapeFit`, `Surface`.
 
-    No face is looked for on flat ends.
+    No face is looked for on flat ends; where there is nothing else, there is none.
     """
     target = Surface(mesh.vertices * scale, mesh.triangles, smooth=NORMALS).coarser()
     ends = cuts_of(target)
     samples = samples[~beyond(ends, samples * scale)]
+    if len(samples) < LEAST:
+        return []
     work = search_poses(samples * scale, look.size * template, look.tried, look.starts, look.survivors)
     poses = yield from portion(work, 0.0, 0.5)
     yield Progress(0.5, LOOKING)

@@ -11,12 +11,19 @@ from .shape_fit import ShapeFit
 from .shape_space import ShapeSpace
 
 POOR = 2.6  # mm on a head of the reference's size: a mean distance in the face above which there is none
-#: The same where the scan has as much relief of a face as no other thing has: it shows little of one, but that plainly.
+#: The same where the scan has as much relief of a face as few other things have: it shows little of one, but that plainly.
 SURE, LITTLE = 0.9, 5.0
+#: The same relief, and the share of a face, of one that is seen from the side. The less of a face is laid on anything, the more
+#: its relief is like one by chance: ears .94 with a fifth, necks .91 with a third, a chin on a mouth .9 with .53; of faces seen
+#: from up to 35 degrees beside them (MakeHuman's and scans, with noise and holes) .58 and more is there, with .87 and more.
+FROM_SIDE, HALF = 0.85, 0.55
 #: How bad a fit is, above which the relief must be more like a face than chance finds one, and above which there is none. Faces
 #: are up to 6 bad, one cut off below and above with a tube in its mouth 12 with a likeness of .76; necks, sides of heads and
 #: bumpy balls 8 to 18 with up to .70, and tiny faces on parts of a true one 22 with .74.
 ODD, PLAINLY, NONE = 7.0, 0.72, 15.0
+#: Size, as its logarithm, that makes a fit twice as bad; half as much tells next to nothing. Small faces, a child's
+#: and the CT's, are .75 of the reference's (.29 less), and some scans 1.2; the side of a head was taken for a face of .7.
+SIZE = 0.38
 
 
 class Verdict(NamedTuple):
@@ -30,12 +37,14 @@ class Verdict(NamedTuple):
 def judged(reference: Head, space: ShapeSpace, fit: ShapeFit, relief: float) -> Verdict:
     """What to think of ``fit``, for which ``relief`` is enough.
 
-    Likeness counts twice, and how unlikely the shape is counts as well: a skin that was bent far enough lies near
+    Likeness counts twice, and how unlikely shape and size are counts as well: a skin that was bent far enough lies near
     anything, and a face upside down, its nose on the nose, has as much relief as a true one.
     """
     misfit, likeness = misfit_of(space, fit), likeness_of(reference, space, fit)
-    bad = misfit / max(likeness, 0.1) ** 2 * (1 + np.mean(fit.coefficients**2))
-    most = LITTLE if likeness > SURE else POOR
+    odd = np.mean(fit.coefficients**2), (np.log(fit.pose.scale) / SIZE) ** 6
+    bad = misfit / max(likeness, 0.1) ** 2 * (1 + odd[0]) * (1 + odd[1])
+    plain = likeness > FROM_SIDE and share_of(space, fit) > HALF or likeness > SURE and bad < ODD
+    most = LITTLE if plain else POOR
     enough = max(relief, PLAINLY) if bad > ODD else relief
     return Verdict(misfit > most or likeness < enough or bad > NONE, float(bad), likeness)
 
@@ -46,6 +55,11 @@ def likeness_of(reference: Head, space: ShapeSpace, fit: ShapeFit) -> float:
     fitted = np.zeros(len(skin))
     skin[space.vertices], fitted[space.vertices] = fit.points, fit.trust
     return face_likeness(reference, skin, fitted)
+
+
+def share_of(space: ShapeSpace, fit: ShapeFit) -> float:
+    """How much of the face found the scan, 0..1."""
+    return float(np.average(np.isfinite(fit.distance), weights=space.area * (space.face > 0.5)))
 
 
 def misfit_of(space: ShapeSpace, fit: ShapeFit) -> float:
