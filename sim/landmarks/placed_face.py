@@ -25,6 +25,10 @@ NO_FACE = (
     "No face is found in the scan: check that it shows one, or give landmarks with --landmarks or by clicking them."
 )
 TRIAL_MODES = 40
+#: Standard deviation of heads' size, as its logarithm, about the reference's. Of adults it is .026 in one sex (head
+#: circumference in ANSUR, Gordon et al. 1989), and women's heads are 4 % smaller than men's; children's are smaller yet. Where
+#: a scan shows much of a head this tells little; where a face is cut off all round it keeps size and shape apart.
+SIZE = 0.05
 
 
 @dataclass(frozen=True)
@@ -108,7 +112,7 @@ def _trials(look, few, mesh, samples, template, scale) -> Work:
         outward = facing_out(few, target, pose)
         part = (0.5 + 0.5 * (k + extra) / len(poses) for extra in (0, 1))
         try:
-            fit = yield from run(fit_shape(few, outward, pose, TRIAL, every=3), *part, LOOKING)
+            fit = yield from run(fit_shape(few, outward, pose, TRIAL, every=3, size=SIZE), *part, LOOKING)
         except NoFaceError:
             continue
         trials.append((misfit_of(few, fit), scale, fit, outward))
@@ -128,7 +132,7 @@ def _fits(look, reference, space, few, rivals, good) -> Work:
     for k, (_, scale, fit, target) in enumerate(rivals):
         if k >= good and _any_face(results):
             break
-        work = fit_shape(space, target, fit.pose, coefficients=fit.coefficients)
+        work = fit_shape(space, target, fit.pose, coefficients=fit.coefficients, size=SIZE)
         try:
             fit = yield from run(work, *(0.5 * (k + np.arange(2)) / len(rivals)), FITTING)
         except NoFaceError:
@@ -146,9 +150,9 @@ def _fits(look, reference, space, few, rivals, good) -> Work:
                 return results
             done, before, start = next(parts), done, verdict
             try:
-                work = fit_shape(few, target, _lies(space, fit), TRIAL, every=3)
+                work = fit_shape(few, target, _lies(space, fit), TRIAL, every=3, size=SIZE)
                 fit = yield from run(work, before, (3 * before + done) / 4, FITTING)
-                work = fit_shape(space, target, fit.pose, coefficients=fit.coefficients)
+                work = fit_shape(space, target, fit.pose, coefficients=fit.coefficients, size=SIZE)
                 fit = yield from run(work, (3 * before + done) / 4, done, FITTING)
             except NoFaceError:
                 break

@@ -42,11 +42,7 @@ STANDS_OFF = 35.0  # mm: so far hair may
 SEEN_DEEP = (13.0, 18.0)
 PATCH = 40.0  # mm²: so much of the surface says one thing
 TOLD = 1.0  # mm by which a place that is told may be wrong
-TILT = 0.05  # rad of turn that counts as much as 1 standard deviation
-#: Standard deviation of heads' size, as its logarithm, about the reference's. Of adults it is .026 in one sex (head
-#: circumference in ANSUR, Gordon et al. 1989), and women's heads are 4 % smaller than men's. Where a scan shows a whole head
-#: this tells nothing; of a face cut off all round it keeps size and shape apart.
-SIZE = 0.05
+TILT = 0.05  # rad of turn, and fraction of size, that count as much as 1 standard deviation
 
 
 class NoFaceError(Exception):
@@ -121,12 +117,14 @@ def fit_shape(
     expression=REST,
     told: Told | None = None,
     hair=None,
+    size: float | None = None,
 ):
     """A generator: yields the fraction done, returns the `ShapeFit` that begins at ``pose``.
 
     coefficients (k,) : to begin with, of the first k modes; every : look at each so many-th point of the skin only;
     expression : what lips and lids are taken to do; told : what is known besides (None: nothing); hair (n,) bool : points
     that are known to lie under hair; where it is known that none does, the scalp counts as any skin
+    size : standard deviation of the head's size, as its logarithm, about the reference's (None: nothing is known of it)
 
     Raises
     ------
@@ -180,11 +178,12 @@ def fit_shape(
             system += rows.T @ rows
             pull += rows.T @ (off.ravel() / TOLD)
         prior = np.full(7 + m, 1 / variance)
-        prior[:3] = 1e-3 / TILT**2
+        prior[[0, 1, 2, 6]] = 1e-3 / TILT**2
         prior[3:6] = 1e-6
-        prior[6] = 1 / SIZE**2
+        if size is not None:
+            prior[6] = 1 / size**2
+            pull[6] -= prior[6] * np.log(scale)
         system[np.diag_indices_from(system)] += prior
-        pull[6] -= prior[6] * np.log(scale)
         pull[7:] += prior[7:] * usual
         if not expression.parted:
             system[7:, 7:] += space.seal
