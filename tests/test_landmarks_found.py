@@ -161,6 +161,7 @@ def test_of_two_places_a_face_fits_as_well_the_likelier_shape_is_better(referenc
         (2.7, 0.9, 1.3, 0.67, 0.89, True),  # seen from 28 degrees beside it
         (3.4, 0.93, 1.04, 0.61, 0.77, True),  # a child seen from 34 degrees beside it
         (3.3, 0.876, 0.68, 0.53, 0.96, True),  # cut off all round, noisy and with holes
+        (4.7, 0.92, 0.59, 0.34, 0.88, True),  # cut off all round, with holes, seen from 34 degrees beside it
         (4.9, 0.91, 1.05, 0.36, 0.81, False),  # a neck again
         (3.1, 0.904, 1.18, 0.53, 0.98, False),  # a chin on a mouth
         (1.3, 0.737, 2.0, 0.93, 0.7, False),  # the side of a head

@@ -12,11 +12,12 @@ from .shape_space import ShapeSpace
 
 POOR = 2.6  # mm on a head of the reference's size: a mean distance in the face above which there is none
 #: The same where the scan has as much relief of a face as few other things have, and either ``HALF`` of one, as if seen from
-#: the side, or less but that plainly: no more than ``ODD`` bad. The less of a face is laid on anything, the more its relief is
-#: like one by chance: ears .94 with a fifth, necks .91 with a third, a chin on a mouth .9 with .53; of faces seen from up to 35
-#: degrees beside them (MakeHuman's and scans, with noise and holes) .58 and more is there, with .87 and more.
+#: the side, or less but that plainly: no more than ``ODDER`` bad. The less of a face is laid on anything, the more its relief
+#: is like one by chance: ears .94 with a fifth, necks .91 with a third, a chin on a mouth .9 with .53; of faces seen from up to
+#: 35 degrees beside them (MakeHuman's and scans, with noise and holes) .58 and more is there, with .87 and more. Crops of
+#: faces, noisy and with holes, with a third to a half of them are up to 7.6 bad, what is none 9 and more.
 SURE, LITTLE = 0.85, 5.0
-HALF = 0.55
+HALF, ODDER = 0.55, 8.2
 #: How bad a fit is, above which the relief must be more like a face than chance finds one, and above which there is none. Faces
 #: are up to 6 bad, one cut off below and above with a tube in its mouth 12 with a likeness of .76; necks, sides of heads and
 #: bumpy balls 8 to 18 with up to .70, and tiny faces on parts of a true one 22 with .74.
@@ -43,7 +44,7 @@ def judged(reference: Head, space: ShapeSpace, fit: ShapeFit, relief: float) -> 
     misfit, likeness = misfit_of(space, fit), likeness_of(reference, space, fit)
     odd = np.mean(fit.coefficients**2), (np.log(fit.pose.scale) / SIZE) ** 6
     bad = misfit / max(likeness, 0.1) ** 2 * (1 + odd[0]) * (1 + odd[1])
-    plain = likeness > SURE and (share_of(space, fit) > HALF or bad < ODD)
+    plain = likeness > SURE and (share_of(space, fit) > HALF or bad < ODDER)
     most = LITTLE if plain else POOR
     enough = max(relief, PLAINLY) if bad > ODD else relief
     return Verdict(misfit > most or likeness < enough or bad > NONE, float(bad), likeness)
