@@ -23,7 +23,7 @@ HALF, ODDER = 0.55, 8.2
 #: bumpy balls 8 to 18 with up to .70, and tiny faces on parts of a true one 22 with .74.
 ODD, PLAINLY, NONE = 7.0, 0.72, 15.0
 #: Size, as its logarithm, that makes a fit twice as bad; half as much tells next to nothing. Small faces, a child's
-#: and the CT's, are .75 of the reference's (.29 less), and some scans 1.2; the side of a head was taken for a face of .7.
+#: and the CT's, are .75 of the reference's (.29 less), and some scans 1.2; the side of a head would pass for a face of .7.
 SIZE = 0.42
 
 
