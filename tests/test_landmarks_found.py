@@ -4,15 +4,16 @@
 import numpy as np
 import pytest
 
+from headshop.sim.adapt.closest import Surface
 from headshop.sim.adapt.landmarks import read_landmarks
 from headshop.sim.anatomy.landmark_names import SKIN, mirrored
 from headshop.sim.errors import InputError
 from headshop.sim.landmarks import placed_face, verdict
 from headshop.sim.landmarks.find import find_landmarks
 from headshop.sim.landmarks.pose_search import Pose
-from headshop.sim.landmarks.shape_fit import ShapeFit
+from headshop.sim.landmarks.shape_fit import ShapeFit, fit_shape
 from headshop.sim.landmarks.shape_space import shape_space
-from headshop.sim.landmarks.verdict import Verdict, judged
+from headshop.sim.landmarks.verdict import Verdict, judged, share_of
 from headshop.sim.mesh import Mesh
 from headshop.sim.mesh_subdivision import drawn, smoother
 from headshop.sim.progress import Progress, finish
@@ -175,6 +176,51 @@ def test_what_is_taken_for_a_face(reference, monkeypatch, misfit, likeness, spre
     monkeypatch.setattr(verdict, "share_of", lambda *_: share)
     fit = ShapeFit(None, np.full(10, spread), Pose(size, np.eye(3), np.zeros(3), 0.0), None, None, None)
     assert judged(reference, None, fit, 0.53).doubtful != face
+
+
+def test_the_share_of_a_face_is_that_of_its_area_which_found_the_scan(reference):
+    space = shape_space(reference)
+    face, left = space.face > 0.5, space.points[:, 0] > 0
+
+    def share(found):
+        return share_of(space, ShapeFit(None, None, None, None, np.where(found, 0.1, np.nan), None))
+
+    assert share(face) == 1.0 and share(~face) == 0.0
+    assert 0.4 < share(face & left) < 0.6
+    assert share(face & left) + share(face & ~left) == pytest.approx(1.0)
+
+
+def test_a_known_size_holds_a_head_to_it(reference):
+    """A tenth too large, the scan is followed where nothing is known of its size, and not where that is known to a hair."""
+    space = shape_space(reference).reduced(10)
+    scan = Surface(1.1 * reference.skin.vertices, reference.skin.triangles)
+    start = Pose(1.0, np.eye(3), np.zeros(3), 0.0)
+    free, held = (finish(fit_shape(space, scan, start, every=3, size=size)).pose.scale for size in (None, 1e-4))
+    assert abs(free - 1.1) < 0.03 and abs(held - 1.0) < 0.005
+
+
+@pytest.mark.parametrize("degrees, slope", [(28, 0.3), (35, 0.25)])
+def test_a_face_that_one_scanner_saw_from_the_side_is_found(reference, shared, degrees, slope):
+    """Where the skin slopes away from it there is nothing: a third of the face."""
+    scan = clean_scan(read_ply(shared / "makehuman" / "mh_african-male-young.ply"))[0]
+    whole = finish(find_landmarks(scan, reference)).positions
+    a, b, c = (scan.vertices[scan.triangles[:, k]] for k in range(3))
+    normals = np.cross(b - a, c - a)
+    seen = normals @ [np.sin(np.radians(degrees)), -np.cos(np.radians(degrees)), 0.0]
+    seen = seen > slope * np.linalg.norm(normals, axis=1)
+    found = finish(find_landmarks(Mesh.from_triangles(scan.vertices, scan.triangles[seen]), reference))
+    off = [np.linalg.norm(found.positions[n] - whole[n]) for n in FACE if n in found.sure()]
+    assert len(off) > 15 and np.mean(off) < 5.0
+
+
+def test_a_crop_from_brows_to_mouth_is_found_upright(reference, shared):
+    scan = clean_scan(read_ply(shared / "scans" / "fran_cyberware.ply"))[0]
+    height = scan.vertices[scan.triangles].mean(axis=1)[:, 2]
+    crop = Mesh.from_triangles(scan.vertices, scan.triangles[(height > -70.0) & (height < 68.0)])
+    found = finish(find_landmarks(crop, reference)).positions
+    true = read_landmarks(shared / "scans" / "fran_cyberware.landmarks.json")
+    names = ("n", "prn", "sn", "en_l", "en_r", "ex_l", "ex_r", "ch_l", "ch_r")
+    assert np.mean([np.linalg.norm(found[n] - true[n]) for n in names if n in true]) < 6.0
 
 
 def test_where_there_are_only_flat_ends_no_face_is_found(reference):

@@ -24,7 +24,7 @@ HALF, ODDER = 0.55, 8.2
 ODD, PLAINLY, NONE = 7.0, 0.72, 15.0
 #: Size, as its logarithm, that makes a fit twice as bad; half as much tells next to nothing. Small faces, a child's
 #: and the CT's, are .75 of the reference's (.29 less), and some scans 1.2; the side of a head would pass for a face of .7.
-SIZE = 0.42
+ODD_SIZE = 0.42
 
 
 class Verdict(NamedTuple):
@@ -42,8 +42,8 @@ def judged(reference: Head, space: ShapeSpace, fit: ShapeFit, relief: float) -> 
     anything, and a face upside down, its nose on the nose, has as much relief as a true one.
     """
     misfit, likeness = misfit_of(space, fit), likeness_of(reference, space, fit)
-    odd = np.mean(fit.coefficients**2), (np.log(fit.pose.scale) / SIZE) ** 6
-    bad = misfit / max(likeness, 0.1) ** 2 * (1 + odd[0]) * (1 + odd[1])
+    shape, size = np.mean(fit.coefficients**2), (np.log(fit.pose.scale) / ODD_SIZE) ** 6
+    bad = misfit / max(likeness, 0.1) ** 2 * (1 + shape) * (1 + size)
     plain = likeness > SURE and (share_of(space, fit) > HALF or bad < ODDER)
     most = LITTLE if plain else POOR
     enough = max(relief, PLAINLY) if bad > ODD else relief
@@ -60,11 +60,15 @@ def likeness_of(reference: Head, space: ShapeSpace, fit: ShapeFit) -> float:
 
 def share_of(space: ShapeSpace, fit: ShapeFit) -> float:
     """How much of the face found the scan, 0..1."""
-    return float(np.average(np.isfinite(fit.distance), weights=space.area * (space.face > 0.5)))
+    return float(np.average(np.isfinite(fit.distance), weights=_face_area(space)))
 
 
 def misfit_of(space: ShapeSpace, fit: ShapeFit) -> float:
     """Mean distance of the face to the scan, mm; what found nothing counts as far."""
-    weight = space.area * (space.face > 0.5)
     distance = np.where(np.isfinite(fit.distance), np.abs(fit.distance), 6.0)
-    return float(np.average(distance, weights=weight)) / fit.pose.scale
+    return float(np.average(distance, weights=_face_area(space))) / fit.pose.scale
+
+
+def _face_area(space):
+    """(n,) mm² of the face that each point stands for."""
+    return space.area * (space.face > 0.5)
