@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..relax.mouth_gap import depths
+from ..relax.mouth_gap import DEEP, depths
 from .closest import Surface
 
 
@@ -27,9 +27,10 @@ class EyeFrame:
         """Places (c, r, 3) mm at ``shares`` (c,) of the way and ``heights`` (r,) above it, in mm of the reference."""
         return (self.inner + shares[:, None] * self.way)[:, None] + self.scale * heights[:, None] * self.up
 
-    def depth(self, target: Surface, places) -> np.ndarray:
-        """How far (...) the scan lies behind ``places`` (..., 3), in mm of the reference; NaN where it has nothing."""
-        return depths(target, places.reshape(-1, 3), self.forward).reshape(places.shape[:-1]) / self.scale
+    def depth(self, target: Surface, places, deep: float = DEEP) -> np.ndarray:
+        """How far (...) the scan lies behind ``places`` (..., 3), in mm of the reference; NaN where it has nothing less than
+        ``deep`` mm off."""
+        return depths(target, places.reshape(-1, 3), self.forward, deep).reshape(places.shape[:-1]) / self.scale
 
     def behind(self, places, depth) -> np.ndarray:
         """Points (..., 3) mm of the scan that lie ``depth`` (...) behind ``places`` (..., 3)."""

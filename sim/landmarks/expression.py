@@ -5,10 +5,11 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..adapt.closest import Surface
-from ..adapt.lid_line import LidLine
+from ..adapt.lid_line import PLAIN, LidLine
 from ..relax.mouth_gap import lip_edges
 from ..relax.upper_teeth import incisal_edge
 from .eye_gaps import EyeGaps, gaps_in_eyes
+from .eye_sockets import socket_corners
 from .eyeballs_seen import eyeballs_seen
 from .lid_creases import lid_lines, shut_by_creases, told_of_lids
 from .lip_line import LipLine, lip_line
@@ -27,7 +28,9 @@ LOOKED = np.linspace(-0.28, 0.28, 9)  # shares of the way from the middle of the
 #: Eyes that are open, as their gaps tell, and shut farther than this were misread: the gaps take the lids' edges with them,
 #: and nothing else holds the lids up.
 DROOPED = 0.15
-WIDE = -0.2  # eyes that fit so much wider open than the reference's are not seen to be shut: the fit is off there
+#: Eyes that fit so much wider open than the reference's are not seen to be shut, for the fit is off there, unless there is no
+#: second crease at all: no more than that much of the first.
+WIDE, ALONE = -0.2, 0.1
 #: mm on a head of the reference's size between the edges of lips that are parted: noise parts closed lips by 2.9, a tube
 #: between them by 6, a smile with teeth by 12.
 APART = 4.0
@@ -78,11 +81,13 @@ def _fit_lids(space, target, fit, parted, told):
         every = more if told is None else told.and_of(more)
         return part_of(fit_shape(space, target, fit.pose, CHANGE, start, 1, expression, every), 2, 3)
 
-    laid = space.landmarks(fit.points), fit.matrix, target
+    marks = space.landmarks(fit.points)
+    corners = socket_corners(marks, fit.matrix, target)
+    laid = marks | corners, fit.matrix, target
     gaps = gaps_in_eyes(*laid)
-    eyeballs = eyeballs_seen(*laid)
-    known_open = gaps.show_open or bool(eyeballs)
-    seen = open_lids(*laid, eyeballs) if known_open else {}
+    eyeballs = {} if corners else eyeballs_seen(*laid)
+    known_open = gaps.show_open or bool(eyeballs) or bool(corners)
+    seen = corners | open_lids(*laid, eyeballs) if known_open else {}
     if seen:
         lids = told_of_open_lids(space, fit, seen)
         return (yield from changed(Expression(parted), fit.coefficients, lids)), Expression(parted, lids=seen)
@@ -111,7 +116,8 @@ def shut_by_sight(gaps: EyeGaps, lines: dict[str, LidLine], share: dict[str, flo
     if gaps.show_open or gaps.show_shut:
         return gaps.show_shut
     shut = shut_by_creases(lines)
-    return None if shut and np.mean(list(share.values())) < WIDE else shut
+    alone = max(line.second / max(line.depth, PLAIN) for line in lines.values()) < ALONE
+    return None if shut and not alone and np.mean(list(share.values())) < WIDE else shut
 
 
 def shut_share(space: ShapeSpace, fit: ShapeFit) -> dict[str, float]:

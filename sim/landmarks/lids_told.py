@@ -22,4 +22,4 @@ def lids_told(space: ShapeSpace, fit: ShapeFit, shown: Expression, target: Surfa
         # The corners of an eye, where they are given, tell how far the head laid on the scan is off there.
         corners = [corner for corner in (f"en_{name[-1]}", f"ex_{name[-1]}") if corner in given]
         met[name] = met[name] + np.mean([given[c] - laid[c] for c in corners] or np.zeros((1, 3)), axis=0)
-    return met | {name: place for name, place in shown.lids.items() if name[-1] in silent}
+    return met | {name: place for name, place in shown.lids.items() if name[-1] in silent and name not in given}

@@ -24,7 +24,7 @@ BAND = 1.75  # mm inside and outside an arch
 USUAL, SPREAD, HEEDED = 9.0, 3.0, 0.25  # mm between open lids, and how much that counts against what is seen
 LEAST = 2.5  # mm between lids that are open
 PLAIN = 0.8  # of 4: difference between inside and outside of two arches on two eyes from which on they are margins
-NEAR = 6.0  # mm before or behind where a lid is taken to lie: what lies farther off is none
+NEAR = 9.0  # mm before or behind where a lid is taken to lie: what lies farther off is none
 MARGIN = {"ps": 0.5, "pi": -0.2}  # mm from the arch to where people pick the margin of the lid
 
 

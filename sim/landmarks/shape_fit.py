@@ -52,7 +52,8 @@ class NoFaceError(Exception):
 @dataclass(frozen=True)
 class Expression:
     """What lips and lids do: whether the lips are ``parted``, the sides ("l", "r") of eyes that are ``shut``, and whether
-    eyes are ``wide`` open, as the reference's. ``lids`` : name -> (3,) mm, ``ps`` and ``pi`` of eyes that are seen open."""
+    eyes are ``wide`` open, as the reference's. ``lids`` : name -> (3,) mm, ``ps`` and ``pi`` of eyes that are seen open, and
+    ``en`` and ``ex`` of empty sockets."""
 
     parted: bool = False
     shut: tuple[str, ...] = ()

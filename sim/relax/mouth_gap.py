@@ -89,9 +89,10 @@ def opening(edges, shares) -> float:
     return float(np.median(np.nan_to_num(apart))) if len(apart) else 0.0
 
 
-def depths(target: Surface, points, forward) -> np.ndarray:
-    """(k,) mm by which the scan's outermost surface lies behind each of the ``points`` (k, 3); NaN: there is none."""
-    line, along, _, _ = target.crossings(points, np.tile(forward, (len(points), 1)), DEEP)
+def depths(target: Surface, points, forward, deep: float = DEEP) -> np.ndarray:
+    """(k,) mm by which the scan's outermost surface lies behind each of the ``points`` (k, 3); NaN: there is none that lies
+    less than ``deep`` mm off."""
+    line, along, _, _ = target.crossings(points, np.tile(forward, (len(points), 1)), deep)
     out = np.full(len(points), np.nan)
     order = np.argsort(along, kind="stable")
     out[line[order]] = -along[order]  # the last one written lies farthest out
