@@ -11,9 +11,10 @@ from headshop.sim.adapt.closest import Surface
 from headshop.sim.landmarks import expression
 from headshop.sim.landmarks.expression import lips_ajar
 from headshop.sim.landmarks.find import find_landmarks
-from headshop.sim.landmarks.mouth_outline import DOWN, gap_end, mouth_outline, widest_gap
+from headshop.sim.landmarks.mouth_outline import DOWN, gap_end, lip_rolls, looked_at, mouth_outline, widest_gap
 from headshop.sim.landmarks.pose_search import Pose
 from headshop.sim.progress import finish
+from headshop.sim.relax.mouth_gap import lip_edges
 from headshop.sim.scan.clean import clean_scan
 from headshop.sim.scan.ply import read_ply
 
@@ -28,10 +29,17 @@ def _triangles(shape):
     return np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
 
 
-def _face(gap=True, teeth=False, wide=OPEN):
-    """A rounded surface with a gap in it like that between smiling lips, ``wide`` mm, and teeth behind it, if any."""
+def _face(gap=True, teeth=False, wide=OPEN, rolled=(0.0, 0.0), noise=0.0):
+    """A rounded surface with a gap in it like that between smiling lips, ``wide`` mm, and teeth behind it, if any.
+
+    rolled : mm by which the edges of the upper and the lower lip turn in; noise : mm
+    """
     x, z = np.meshgrid(np.arange(-60, 60.1, 0.8), np.arange(-60, 40.1, 0.8))
-    points = np.stack([x, x**2 / 40, z], axis=2).reshape(-1, 3)
+    above = z - RISE * (x / HALF) ** 2
+    near = np.clip(1 - (np.abs(above) - wide / 2 * (1 - (x / HALF) ** 2)) / 4, 0, 1) ** 2
+    y = x**2 / 40 + near * np.where(above > 0, *rolled)
+    points = np.stack([x, y, z], axis=2).reshape(-1, 3)
+    points += noise * np.random.default_rng(3).standard_normal(points.shape)
     triangles = _triangles(x.shape)
     across, _, up = points[triangles].mean(axis=1).T
     share = across / HALF
@@ -82,17 +90,20 @@ def test_lips_are_ajar_when_a_little_apart_and_what_is_wide_is_left_to_the_outli
 
 
 @pytest.mark.parametrize(
-    ("fits", "teeth", "wide", "ajar"),
+    ("fits", "teeth", "rolled", "wide", "ajar"),
     [
-        (1.0, False, False, True),
-        (1.0, True, True, True),
-        (0.8, False, True, True),
-        (1.2, False, False, False),
-        (1.2, True, True, False),
+        (1.0, False, False, False, True),
+        (1.0, True, False, True, True),
+        (1.0, False, True, True, True),
+        (0.8, False, False, False, True),
+        (0.7, False, False, True, True),
+        (1.2, False, False, False, False),
+        (1.2, True, False, True, False),
+        (1.2, False, True, True, False),
     ],
 )
-def test_lips_are_far_apart_only_where_teeth_show_or_closed_ones_fit_plainly_worse(
-    fits, teeth, wide, ajar, monkeypatch
+def test_lips_are_far_apart_only_where_they_roll_in_teeth_show_or_closed_ones_fit_plainly_worse(
+    fits, teeth, rolled, wide, ajar, monkeypatch
 ):
     """A scan from above has a hole between closed lips too, where the upper one hides the edge of the lower one."""
     closed, free = SimpleNamespace(coefficients=0, pose=None), SimpleNamespace(coefficients=1, pose=None)
@@ -111,7 +122,7 @@ def test_lips_are_far_apart_only_where_teeth_show_or_closed_ones_fit_plainly_wor
         "teeth_seen": lambda *_: teeth,
     }.items():
         monkeypatch.setattr(expression, name, answer)
-    for outline, parted in (("seen", wide), (None, ajar)):
+    for outline, parted in ((SimpleNamespace(rolled=rolled), wide), (None, ajar)):
         monkeypatch.setattr(expression, "outline_of", lambda *_, seen=outline: seen)
         assert finish(expression._fit_lips(SimpleNamespace(parted=1), None, closed))[1] == parted
 
@@ -127,6 +138,41 @@ def test_teeth_between_lips_are_seen(teeth, behind):
     space = SimpleNamespace(landmarks=lambda points: _guess())
     free = SimpleNamespace(points=None, pose=Pose(1.0, np.eye(3), np.zeros(3), 0.0))
     assert expression.teeth_seen(space, free, face) == (teeth and behind < 12)
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.25])
+@pytest.mark.parametrize(("upper", "lower"), [(0, 0), (3, 0), (0, 3), (1.5, 1.5), (5, 1.5)])
+def test_lips_of_an_open_mouth_roll_in_and_edges_of_a_hole_do_not(upper, lower, noise):
+    found = mouth_outline(_face(rolled=(upper, lower), noise=noise), _guess(), FORWARD)
+    assert found.rolled is (min(upper, lower) > 0)
+
+
+def test_how_far_lips_roll_in_is_measured_at_either():
+    column = looked_at(_face(rolled=(3.0, 1.5)), _guess(), FORWARD, 1.0)[1]
+    upper, lower = lip_rolls(column, len(column) // 2)
+    assert upper == pytest.approx(2.5, abs=0.6) and lower == pytest.approx(1.25, abs=0.4)  # 3 and 1.5 at the very edge
+    assert lip_rolls(looked_at(_face(gap=False), _guess(), FORWARD, 1.0)[1], len(column) // 2) == (0.0, 0.0)
+
+
+def test_a_mouth_is_found_that_is_open_to_below_where_the_chin_was_expected():
+    """A jaw that opened far takes the chin down with it, and a first guess may not."""
+    face, high = _face(wide=30.0), _guess() | {"ls": np.array([0.0, 0, 20]), "pg": np.array([0.0, 0, -8])}
+    found = mouth_outline(face, high, FORWARD)
+    assert found.lower[2] == pytest.approx(-15, abs=1.5) and found.upper[2] == pytest.approx(15, abs=1.5)
+
+
+@pytest.mark.parametrize(("half", "tall"), [(25.0, 12.0), (18.0, 34.0), (20.0, 28.0)])
+def test_edges_are_found_aside_of_the_middle_too_however_round_the_mouth(half, tall):
+    """On straight ways from the middle of a lip to a corner one is within the gap of a round mouth."""
+    face = _face(gap=False)
+    x, _, z = face.vertices[face.triangles].mean(axis=1).T
+    face = Surface(face.vertices, face.triangles[(x / half) ** 2 + (2 * z / tall) ** 2 > 1])
+    lip = tall / 2 + 4
+    marks = {"ls": (0, 0, lip), "li": (0, 0, -lip), "ch_l": (half, half**2 / 40, 0), "ch_r": (-half, half**2 / 40, 0)}
+    shares = np.linspace(-0.4, 0.4, 9)
+    edges = lip_edges(face, {name: np.array(place, dtype=float) for name, place in marks.items()}, FORWARD, shares)
+    height = tall / 2 * np.sqrt(1 - shares**2)
+    np.testing.assert_allclose(edges[:, :, 2], np.stack([height, -height], axis=1), atol=2.0)
 
 
 def test_closed_lips_have_no_outline():

@@ -16,6 +16,9 @@ STEP = 2.0  # mm: a step in depth this large from one place to the next is an ed
 EATEN = 1.0  # mm by which a scanner loses an edge beside nothing
 SPECK = 1.2  # mm: a hole no longer than this, with data as deep on both sides, is none
 LIP = 8.0  # mm: what lies deeper than this behind the line from lip to lip is no lip
+#: Height of a mouth from lip to lip against its width up to which lines begin and end on the straight ways from the lips'
+#: middles to the corners, and from which on they do on an ellipse: of a round mouth those ways run within the gap.
+OVAL, ROUND = 0.6, 0.9
 ROUGH = 1.0  # mm by which an edge usually strays from a smooth line
 FEWEST = 10  # edges that make a lip
 #: Sides of the scan's triangles: how far beside a gap it is asked how deep it lies, and how near the scan must be; of how many
@@ -54,7 +57,10 @@ def profiles(target: Surface, given, forward, shares):
     behind them, see `lip_edges`."""
     aside = np.abs(shares)[:, None]
     corner = np.where(shares[:, None] > 0, given["ch_l"], given["ch_r"])
-    upper, lower = (given[name] + aside * (corner - given[name]) for name in ("ls", "li"))
+    middle, width = (given["ch_l"] + given["ch_r"]) / 2, np.linalg.norm(given["ch_l"] - given["ch_r"])
+    round_ = np.clip((np.linalg.norm(given["ls"] - given["li"]) / width - OVAL) / (ROUND - OVAL), 0, 1)
+    over = (1 - round_) * (1 - aside) + round_ * np.sqrt(np.clip(1 - aside**2, 0, None))
+    upper, lower = (middle + aside * (corner - middle) + over * (given[name] - middle) for name in ("ls", "li"))
     lines = upper[:, None] + np.linspace(0, 1, STEPS)[:, None] * (lower - upper)[:, None]
     return lines, bridged_depths(target, lines.reshape(-1, 3), forward).reshape(len(shares), STEPS)
 
