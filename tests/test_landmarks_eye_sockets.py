@@ -67,6 +67,18 @@ def test_there_are_none_in_shut_eyes_holes_or_eyeballs(sockets, seen_skin):
         assert socket_corners(seen[1], np.eye(3), seen[0]) == {}
     target, marks = sockets(("l",))  # one socket alone is a hole
     assert socket_corners(marks, np.eye(3), target) == {}
+    target, marks = sockets(depth=80.0)  # and through a hole the back of the head's shell is seen
+    assert socket_corners(marks, np.eye(3), target) == {}
+
+
+def test_sockets_of_a_head_are_alike(sockets):
+    target, marks = sockets()
+    x, y, z = marks["ex_l"] + [-8.5, -9.0, 0.0]
+    lid = np.array(
+        [[x, y, z - 14], [x + 18, y, z - 14], [x + 18, y, z + 14], [x, y, z + 14]]
+    )  # over a third of one of them
+    covered = target.beside(lid, np.array([[0, 1, 2], [0, 2, 3]]))
+    assert socket_corners(marks, np.eye(3), covered) == {}
 
 
 def eye(width=28.0, height=9.0, bottom=25.0, hole=0.0):

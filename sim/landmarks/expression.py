@@ -83,7 +83,7 @@ def _fit_lids(space, target, fit, parted, told):
     corners = socket_corners(marks, fit.matrix, target)
     laid = marks | corners, fit.matrix, target
     gaps = gaps_in_eyes(*laid)
-    eyeballs = {} if corners else eyeballs_seen(*laid)
+    eyeballs = eyeballs_seen(*laid)
     known_open = gaps.show_open or bool(eyeballs) or bool(corners)
     seen = corners | open_lids(*laid, eyeballs) if known_open else {}
     if seen:

@@ -37,7 +37,7 @@ class MouthOutline:
     corners: dict[str, np.ndarray]
     upper: np.ndarray
     lower: np.ndarray
-    rolled: bool = False
+    rolled: bool
 
     @property
     def marks(self) -> dict[str, np.ndarray]:
