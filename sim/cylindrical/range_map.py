@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..angles import bearing
 from ..mesh import Mesh
 from .axis import upright_axis
 from .rays import outermost
@@ -81,7 +82,7 @@ class RangeMap:
     def texels(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Fractional row, fractional column and radius (mm) of ``points`` (..., 3) mm."""
         local = (np.asarray(points, dtype=float) - self.origin) @ self.axes.T
-        longitude = np.arctan2(local[..., 0], -local[..., 1])
+        longitude = bearing(local[..., 0], -local[..., 1])
         middle = self.first + self.step * (self.shape[1] - 1) / 2
         longitude = middle + np.mod(longitude - middle + np.pi, TURN) - np.pi
         rows = (self.top - local[..., 2]) / self.rise

@@ -3,6 +3,8 @@
 
 import numpy as np
 
+from ..angles import bearing
+
 #: Triangles and triangle-ray pairs looked at at once: they bound the memory.
 BLOCK, BATCH = 400_000, 1_500_000
 
@@ -20,7 +22,7 @@ def outermost(local, triangles, first, step, width, top, rise, height):
     which = np.full(width * height, -1, dtype=np.int32)
     weights = np.zeros((width * height, 3))
     slope = np.zeros(width * height)
-    longitude = np.arctan2(local[:, 0], -local[:, 1])
+    longitude = bearing(local[:, 0], -local[:, 1])
     row = (top - local[:, 2]) / rise
     for start in range(0, len(triangles), BLOCK):
         corner = triangles[start : start + BLOCK]

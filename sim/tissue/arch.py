@@ -12,6 +12,7 @@ from scipy.ndimage import gaussian_filter, maximum_filter, minimum_filter
 
 from ..anatomy.head import Head
 from ..anatomy.teeth import crowns
+from ..angles import bearing
 from .layers import Layers
 from .planes import Planes, empty_planes
 
@@ -42,7 +43,7 @@ class Arch:
         rel = points[:, :2] - self.centre
         far = np.maximum(np.hypot(rel[:, 0], rel[:, 1]), 1e-6)
         radial = np.concatenate([rel / far[:, None], np.zeros((len(rel), 1))], axis=1)
-        return np.arctan2(rel[:, 0], -rel[:, 1]), far, radial
+        return bearing(rel[:, 0], -rel[:, 1]), far, radial
 
     def before(self, points):
         """mm from the axis (k,) of ``points`` (k, 3), and the wall there."""

@@ -7,6 +7,7 @@ all of a blink). The edges lie flush, and above them the skin of crease and fold
 
 import numpy as np
 
+from ..angles import bearing
 from .structures import Lids
 
 #: Share of the opening that the lower lid covers in a blink at the middle of the eye, at least and at most beside it.
@@ -68,7 +69,7 @@ def relief(lids: Lids, shut: np.ndarray, root, length, pair, reach) -> np.ndarra
     local = (shut - lids.eye.centre) @ frame.T
     # the outer edge straight before the inner one
     edge, rim = local[start], local[first]
-    angle = np.arctan2(edge[:, 2], edge[:, 1])
+    angle = bearing(edge[:, 2], edge[:, 1])
     turned = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     thick = length[first]
     flush = np.hypot(edge[:, 1], edge[:, 2])[:, None] * turned + thick[:, None] * turned

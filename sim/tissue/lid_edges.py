@@ -4,6 +4,7 @@
 import numpy as np
 
 from ..anatomy.head import Head
+from ..angles import bearing
 from ..mesh import edges
 from ..mesh_subdivision import limit, subdivision
 
@@ -44,7 +45,7 @@ class LidEdge:
     def reach(self, vertices, upper):
         """(k,) mm along the lid and (k,) rad: the lowest of an upper, the highest of a lower edge."""
         a, f, u = ((self.smooth @ vertices[self.used] - self.centre) @ self.frame.T).T.reshape(3, 3, -1)
-        angle = np.arctan2(u, f)
+        angle = bearing(u, f)
         best = np.where(upper[self.rows], angle.argmin(axis=0), angle.argmax(axis=0))[None]
         return np.take_along_axis(a, best, 0)[0], np.take_along_axis(angle, best, 0)[0]
 

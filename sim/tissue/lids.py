@@ -9,6 +9,7 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from ..anatomy.head import Head
+from ..angles import bearing
 from ..mesh import edges
 from .eye_surface import eye_profile, eyeball_radius
 from .layers import Layers
@@ -58,7 +59,7 @@ def build_lids(head: Head, layers: Layers, side: str) -> Lids | None:
 
     def place(p):
         a, f, u = np.moveaxis((p - eye.centre) @ frame.T, -1, 0)
-        return a, np.arctan2(u, f), np.hypot(u, f)
+        return a, bearing(u, f), np.hypot(u, f)
 
     along, elevation, radius = place(v[column])
     upper = upper_group[column] >= lower_group[column]
