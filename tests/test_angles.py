@@ -15,7 +15,9 @@ from headshop.sim.tissue.frames import Frames
 from headshop.sim.tissue.model import build_model
 
 #: What NumPy reckons in another way, number by number, where input and output might overlap.
-TWOFOLD = "arctan2 sin cos tan arcsin arccos arctan sinh cosh tanh exp exp2 expm1 log log2 log10 log1p cbrt power".split()
+TWOFOLD = (
+    "arctan2 sin cos tan arcsin arccos arctan sinh cosh tanh exp exp2 expm1 log log2 log10 log1p cbrt power".split()
+)
 
 
 @pytest.fixture

@@ -8,6 +8,7 @@ about that point, from the row that ends the placed grid to the bust's edge, wit
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
+from ...sim.angles import bearing
 from .skin_layout import HALF, Layout
 from .skin_rays import MeasuredHead
 
@@ -55,9 +56,9 @@ def place_bust(layout: Layout, x: np.ndarray, head: MeasuredHead, steps: int = 2
     """Bust rows of the left half and the midline, in place; row `NECK_ROW` must be there."""
     columns = bust_columns(layout)
     start = x[columns[:, 0]] - CENTRE
-    first = np.degrees(np.arctan2(start[:, 0], -start[:, 1]))
+    first = np.degrees(bearing(start[:, 0], -start[:, 1]))
     first[[0, -1]] = 0, 180
-    height = np.degrees(np.arctan2(start[:, 2], np.hypot(start[:, 0], start[:, 1])))
+    height = np.degrees(bearing(start[:, 2], np.hypot(start[:, 0], start[:, 1])))
     t = np.linspace(0, 1, steps)
     longitude = np.radians(first[:, None] + (_EDGE_LONGITUDE - first)[:, None] * t)
     up = np.radians(height[:, None] + (_EDGE(_EDGE_LONGITUDE) - height)[:, None] * t)

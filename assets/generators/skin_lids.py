@@ -5,6 +5,7 @@ import numpy as np
 
 from ...sim.adapt.lid_contact import BACK, LidContact
 from ...sim.anatomy.eyeball import reach
+from ...sim.angles import bearing
 from ...sim.mesh import Mesh
 from ...sim.mesh_subdivision import limit
 from .eye_frame import BALL, GAP, RADIUS, eye_frames
@@ -161,7 +162,7 @@ def _margins(inner, outer, above):
 
 def _lid_skin(rim, orbit, inner, outer, above):
     """Tarsal plate, crease and fold of the upper lid; plate, roll and groove of the lower one: (24, 3) each."""
-    start = np.arctan2(rim[:, 2], -rim[:, 1])
+    start = bearing(rim[:, 2], -rim[:, 1])
     apart = np.hypot(rim[:, 1], rim[:, 2])
 
     def over(length, height, share):
@@ -204,7 +205,7 @@ def _cup(edge, inner, outer, above):
     """Fornix and cup (24, 3) each and the row (9, 3) that closes the cup, clear of the ball."""
     side = 1.05 * edge[:, 0]
     ramp = np.clip(np.minimum(inner, outer) / 2, 0, 1)
-    angle = np.arctan2(edge[:, 2], -edge[:, 1]) + np.radians(FORNIX) * np.where(above, 1, -1) * np.clip(
+    angle = bearing(edge[:, 2], -edge[:, 1]) + np.radians(FORNIX) * np.where(above, 1, -1) * np.clip(
         np.minimum(inner, outer) / 3, 0, 1
     )
     depth = np.sqrt(np.maximum((RADIUS + 1.1) ** 2 - side**2, 16))

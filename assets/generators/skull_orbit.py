@@ -3,6 +3,7 @@
 
 import numpy as np
 
+from ...sim.angles import bearing
 from .skull_field import carve, curve, ellipsoid, join, meet, plate, tube
 from .skull_marks import SkullMarks
 
@@ -27,7 +28,7 @@ class Orbit:
         flat = self._seen(rim)
         self.middle = (flat.min(axis=0) + flat.max(axis=0)) / 2
         off = flat - self.middle
-        turn = np.arctan2(off[:, 1], off[:, 0])
+        turn = bearing(off[:, 1], off[:, 0])
         order = np.argsort(turn)
         turn, radius = turn[order], np.linalg.norm(off, axis=1)[order]
         self._turn = np.concatenate([turn - 2 * np.pi, turn, turn + 2 * np.pi])
@@ -54,7 +55,7 @@ class Orbit:
     def hollow(self, p):
         """(n,) mm, negative within the orbit (and in front of it)."""
         off = self._seen(p) - self.middle
-        radius = np.interp(np.arctan2(off[:, 1], off[:, 0]), self._turn, self._radius)
+        radius = np.interp(bearing(off[:, 1], off[:, 0]), self._turn, self._radius)
         cone = (np.linalg.norm(off, axis=1) - radius) * np.maximum(self._taper(p[:, 1]), 0.05)
         cone = meet(cone, p[:, 1] - self.apex[1] + 3.0, 5)
         return join(cone, ellipsoid(p, *self.globe), 4)
