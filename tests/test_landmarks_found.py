@@ -271,3 +271,30 @@ def test_a_place_hardly_like_a_face_is_taken_only_if_a_thorough_look_finds_no_be
     _, fit, _ = finish(placed_face.place_face(scan, reference, shape_space(reference), (1.0,)))
     assert len(taken) == looks
     assert fit == (expected if looks == 2 else "first")
+
+
+def test_a_thorough_look_begins_with_the_places_most_like_a_face(reference, monkeypatch):
+    """A face seen from above lies worse on the scan than on the top of the head: it must be among those that are followed."""
+    space = shape_space(reference)
+    places = {1.0: (2.0, 0.7), 2.0: (3.2, 0.95), 3.0: (2.4, 0.6)}  # size of the pose -> misfit, likeness of its fit
+
+    def search(*rest):
+        yield Progress(0.5, "")
+        return [Pose(size, np.eye(3), np.zeros(3), 0.0) for size in places]
+
+    def fit(space, target, pose, *rest, **more):
+        yield 0.5
+        return pose
+
+    def size(look, pose):
+        return round(pose.scale / look.size, 6)
+
+    for look, order in zip(placed_face.LOOKS, ([1.0, 3.0, 2.0], [2.0, 1.0, 3.0]), strict=True):
+        monkeypatch.setattr(placed_face, "search_poses", search)
+        monkeypatch.setattr(placed_face, "fit_shape", fit)
+        monkeypatch.setattr(placed_face, "misfit_of", lambda _, pose, look=look: places[size(look, pose)][0])
+        monkeypatch.setattr(placed_face, "likeness_of", lambda _, __, pose, look=look: places[size(look, pose)][1])
+        samples = reference.skin.vertices
+        work = placed_face._trials(look, reference, space, reference.skin, samples, samples, 1.0)
+        trials = sorted(finish(work), key=lambda t: t[0])
+        assert [size(look, pose) for _, _, pose, _ in trials] == order

@@ -18,7 +18,7 @@ from .confidence import like_ears
 from .pose_search import LOOKING, STARTS, SURVIVORS, Pose, search_poses
 from .shape_fit import LEAST, TRIAL, NoFaceError, ShapeFit, fit_shape
 from .shape_space import ShapeSpace
-from .verdict import judged, misfit_of
+from .verdict import judged, likeness_of, misfit_of
 
 FITTING = "Fitting a face"
 NO_FACE = (
@@ -43,6 +43,8 @@ class Look:
     again : how many of those are begun again, the first of them and, while none shows a face, others
     relief : correlation with the relief of a face that is enough. Faces have 0.66 and more, most of them 0.8; balls, boxes
         and backs of heads 0.4; the best of many places where none is, 0.6.
+    weigh : power of that correlation by which a placement's misfit is divided when the likeliest are chosen. A face seen from
+        above fits worse than the top of its head, round and whole, on which any dome of a forehead lies.
     """
 
     size: float
@@ -54,11 +56,15 @@ class Look:
     further: int
     again: int
     relief: float
+    weigh: float
 
 
 #: The second is taken if the first shows no plain face: a thorough one, which begins with a small face, because a large one
 #: on a small head finds no hold.
-LOOKS = (Look(1.0, STARTS, SURVIVORS, 10, 3, 1.25, 5, 2, 0.53), Look(0.8, 1000, 400, 14, 4, np.inf, 4, 4, 0.7))
+LOOKS = (
+    Look(1.0, STARTS, SURVIVORS, 10, 3, 1.25, 5, 2, 0.53, 0.0),
+    Look(0.8, 1000, 400, 14, 4, np.inf, 4, 4, 0.7, 2.0),
+)
 PLAIN = 0.66  # relief from which on a first look is enough: faces have as much
 CLEAR = 0.75  # relief from which on nothing better is looked for
 TURNS = 3  # times that a fit is begun again
@@ -81,7 +87,7 @@ def place_face(mesh: Mesh, reference: Head, space: ShapeSpace, unit_scales) -> W
         trials = []
         for k, scale in enumerate(unit_scales):
             part = (low + (middle - low) * (k + extra) / len(unit_scales) for extra in (0, 1))
-            trials += yield from portion(_trials(look, few, mesh, samples, template, scale), *part)
+            trials += yield from portion(_trials(look, reference, few, mesh, samples, template, scale), *part)
         trials.sort(key=lambda t: t[0])
         good = sum(t[0] < look.worse * trials[0][0] for t in trials[: look.most])
         rivals = trials[: look.further]
@@ -93,8 +99,9 @@ def place_face(mesh: Mesh, reference: Head, space: ShapeSpace, unit_scales) -> W
     raise InputError(NO_FACE)
 
 
-def _trials(look, few, mesh, samples, template, scale) -> Work:
-    """Work returning placements of the face in a mesh of ``scale`` mm per unit: misfit, scale, `ShapeFit`, `Surface`.
+def _trials(look, reference, few, mesh, samples, template, scale) -> Work:
+    """Work returning placements of the face in a mesh of ``scale`` mm per unit: misfit as the ``look`` weighs it, scale,
+    `ShapeFit`, `Surface`.
 
     No face is looked for on flat ends; where there is nothing else, there is none.
     """
@@ -115,7 +122,8 @@ def _trials(look, few, mesh, samples, template, scale) -> Work:
             fit = yield from run(fit_shape(few, outward, pose, TRIAL, every=3, size=SIZE), *part, LOOKING)
         except NoFaceError:
             continue
-        trials.append((misfit_of(few, fit), scale, fit, outward))
+        like = max(likeness_of(reference, few, fit), 0.1)
+        trials.append((misfit_of(few, fit) / like**look.weigh, scale, fit, outward))
     return trials
 
 
