@@ -199,18 +199,33 @@ def test_a_known_size_holds_a_head_to_it(reference):
     assert abs(free - 1.1) < 0.03 and abs(held - 1.0) < 0.005
 
 
+def _seen_from(scan, toward, slope):
+    """The triangles of ``scan`` whose normals have ``slope`` and more in the direction ``toward`` (3,)."""
+    a, b, c = (scan.vertices[scan.triangles[:, k]] for k in range(3))
+    normals = np.cross(b - a, c - a)
+    seen = normals @ toward > slope * np.linalg.norm(normals, axis=1)
+    return Mesh.from_triangles(scan.vertices, scan.triangles[seen])
+
+
 @pytest.mark.parametrize("degrees, slope", [(28, 0.3), (35, 0.25)])
 def test_a_face_that_one_scanner_saw_from_the_side_is_found(reference, shared, degrees, slope):
     """Where the skin slopes away from it there is nothing: a third of the face."""
     scan = clean_scan(read_ply(shared / "makehuman" / "mh_african-male-young.ply"))[0]
     whole = finish(find_landmarks(scan, reference)).positions
-    a, b, c = (scan.vertices[scan.triangles[:, k]] for k in range(3))
-    normals = np.cross(b - a, c - a)
-    seen = normals @ [np.sin(np.radians(degrees)), -np.cos(np.radians(degrees)), 0.0]
-    seen = seen > slope * np.linalg.norm(normals, axis=1)
-    found = finish(find_landmarks(Mesh.from_triangles(scan.vertices, scan.triangles[seen]), reference))
+    seen = _seen_from(scan, [np.sin(np.radians(degrees)), -np.cos(np.radians(degrees)), 0.0], slope)
+    found = finish(find_landmarks(seen, reference))
     off = [np.linalg.norm(found.positions[n] - whole[n]) for n in FACE if n in found.sure()]
     assert len(off) > 15 and np.mean(off) < 5.0
+
+
+def test_a_face_that_one_scanner_saw_from_above_is_found(reference, shared):
+    """Much of that scan is the top of the head and shoulders, on which a face lies nearer than on the foreshortened face."""
+    scan = clean_scan(read_ply(shared / "makehuman" / "mh_caucasian-female-young.ply"))[0]
+    seen = _seen_from(scan, [0.0, -np.cos(np.radians(40)), np.sin(np.radians(40))], 0.3)
+    found = finish(find_landmarks(clean_scan(seen)[0], reference))
+    tip = scan.vertices[scan.vertices[:, 1].argmin()]
+    assert np.linalg.norm(found.positions["prn"] - tip) < 4.0
+    assert found.positions["gn"][2] < tip[2] - 40 and found.positions["en_l"][0] > 8
 
 
 def test_a_crop_from_brows_to_mouth_is_found_upright(reference, shared):
