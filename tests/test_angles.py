@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Angles that come out the same wherever their arrays lie in memory."""
 
-import sys
-
 import numpy as np
 import pytest
 
@@ -13,31 +11,6 @@ from headshop.sim.cylindrical.range_map import resample
 from headshop.sim.mesh import Mesh
 from headshop.sim.tissue.frames import Frames
 from headshop.sim.tissue.model import build_model
-
-#: What NumPy reckons in another way, number by number, where input and output might overlap.
-TWOFOLD = (
-    "arctan2 sin cos tan arcsin arccos arctan sinh cosh tanh exp exp2 expm1 log log2 log10 log1p cbrt power".split()
-)
-
-
-@pytest.fixture
-def strided(monkeypatch):
-    """(module, function) of each call from Head Shop's own code with an array of numbers that do not lie together."""
-    found = set()
-
-    def watched(name, function):
-        def call(*args, **kwargs):
-            module = sys._getframe(1).f_globals["__name__"]
-            arrays = [x for x in args if isinstance(x, np.ndarray) and x.size > 1]
-            if ".sim." in module and any(not (x.flags.c_contiguous or x.flags.f_contiguous) for x in arrays):
-                found.add((module, name))
-            return function(*args, **kwargs)
-
-        return call
-
-    for name in TWOFOLD:
-        monkeypatch.setattr(np, name, watched(name, getattr(np, name)))
-    return found
 
 
 def test_bearings_are_angles_from_ahead():

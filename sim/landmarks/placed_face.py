@@ -18,7 +18,7 @@ from .confidence import like_ears
 from .pose_search import LOOKING, STARTS, SURVIVORS, Pose, search_poses
 from .shape_fit import LEAST, TRIAL, NoFaceError, ShapeFit, fit_shape
 from .shape_space import ShapeSpace
-from .verdict import judged, likeness_of, misfit_of
+from .verdict import judged, likeness_of, misfit_of, weighed
 
 FITTING = "Fitting a face"
 NO_FACE = (
@@ -122,8 +122,8 @@ def _trials(look, reference, few, mesh, samples, template, scale) -> Work:
             fit = yield from run(fit_shape(few, outward, pose, TRIAL, every=3, size=SIZE), *part, LOOKING)
         except NoFaceError:
             continue
-        like = max(likeness_of(reference, few, fit), 0.1)
-        trials.append((misfit_of(few, fit) / like**look.weigh, scale, fit, outward))
+        misfit = weighed(misfit_of(few, fit), likeness_of(reference, few, fit), look.weigh)
+        trials.append((misfit, scale, fit, outward))
     return trials
 
 

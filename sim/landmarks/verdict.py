@@ -43,11 +43,16 @@ def judged(reference: Head, space: ShapeSpace, fit: ShapeFit, relief: float) -> 
     """
     misfit, likeness = misfit_of(space, fit), likeness_of(reference, space, fit)
     shape, size = np.mean(fit.coefficients**2), (np.log(fit.pose.scale) / ODD_SIZE) ** 6
-    bad = misfit / max(likeness, 0.1) ** 2 * (1 + shape) * (1 + size)
+    bad = weighed(misfit, likeness, 2) * (1 + shape) * (1 + size)
     plain = likeness > SURE and (share_of(space, fit) > HALF or bad < ODDER)
     most = LITTLE if plain else POOR
     enough = max(relief, PLAINLY) if bad > ODD else relief
     return Verdict(misfit > most or likeness < enough or bad > NONE, float(bad), likeness)
+
+
+def weighed(misfit: float, likeness: float, power: float) -> float:
+    """The ``misfit`` of a skin where the scan has that ``likeness`` of a face, which counts ``power`` times."""
+    return misfit / max(likeness, 0.1) ** power
 
 
 def likeness_of(reference: Head, space: ShapeSpace, fit: ShapeFit) -> float:
