@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Landmarks found without help: in any turn and unit, on whole and on damaged heads, and refused where no face is."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -175,7 +177,7 @@ def test_what_is_taken_for_a_face(reference, monkeypatch, misfit, likeness, spre
     monkeypatch.setattr(verdict, "likeness_of", lambda *_: likeness)
     monkeypatch.setattr(verdict, "share_of", lambda *_: share)
     fit = ShapeFit(None, np.full(10, spread), Pose(size, np.eye(3), np.zeros(3), 0.0), None, None, None)
-    assert judged(reference, None, fit, 0.53).doubtful != face
+    assert judged(reference, SimpleNamespace(size=1.0), fit, 0.53).doubtful != face
 
 
 def test_the_share_of_a_face_is_that_of_its_area_which_found_the_scan(reference):
@@ -281,9 +283,15 @@ def test_a_place_hardly_like_a_face_is_taken_only_if_a_thorough_look_finds_no_be
         return [(first, 1.0, "first", None)] if look is placed_face.LOOKS[0] else [(second, 1.0, "second", None)]
 
     monkeypatch.setattr(placed_face, "_trials", trials)
+
+    def as_it_is(reference, result, *rest, **more):
+        yield Progress(0.5, "")
+        return result
+
     monkeypatch.setattr(placed_face, "_fits", fits)
+    monkeypatch.setattr(placed_face, "_or_from", as_it_is)
     scan = reference.skin
-    _, fit, _ = finish(placed_face.place_face(scan, reference, shape_space(reference), (1.0,)))
+    _, fit, _, _ = finish(placed_face.place_face(scan, reference, shape_space(reference), (1.0,)))
     assert len(taken) == looks
     assert fit == (expected if looks == 2 else "first")
 
@@ -304,7 +312,7 @@ def test_a_thorough_look_begins_with_the_places_most_like_a_face(reference, monk
     def size(look, pose):
         return round(pose.scale / look.size, 6)
 
-    for look, order in zip(placed_face.LOOKS, ([1.0, 3.0, 2.0], [2.0, 1.0, 3.0]), strict=True):
+    for look, order in zip(placed_face.LOOKS, ([1.0, 3.0, 2.0], *([2.0, 1.0, 3.0],) * 2), strict=True):
         monkeypatch.setattr(placed_face, "search_poses", search)
         monkeypatch.setattr(placed_face, "fit_shape", fit)
         monkeypatch.setattr(placed_face, "misfit_of", lambda _, pose, look=look: places[size(look, pose)][0])

@@ -13,6 +13,7 @@ from ..progress import Progress, Work, portion
 from ..scan.depth_jumps import depth_jumps
 from .confidence import judge, judge_together, like_ears, sure_as_corners
 from .expression import fit_expression, line_of, meeting_lids, outline_of
+from .infant import with_mouth_in_place
 from .picked import picked
 from .placed_face import place_face, run, with_likelier_ears
 from .pose_search import LOOKING
@@ -72,10 +73,12 @@ def find_landmarks(mesh: Mesh, reference: Head | None = None, unit_scales=(1.0,)
     jumps = depth_jumps(mesh.vertices, mesh.triangles)
     mesh = Mesh.from_triangles(mesh.vertices, mesh.triangles[~jumps]) if jumps.any() else mesh
     yield Progress(0.05, LOOKING)
-    scale, fit, target = yield from portion(place_face(mesh, reference, space, unit_scales), 0.05, 0.75)
+    scale, fit, target, space = yield from portion(place_face(mesh, reference, space, unit_scales), 0.05, 0.75)
     fit = yield from portion(with_likelier_ears(space, target, fit), 0.75, 0.8)
+    if space.of_infants:
+        fit = yield from run(with_mouth_in_place(space, target, fit), 0.8, 0.82, "Looking for the mouth")
     misfit = misfit_of(space, fit)
-    fit, shown = yield from run(fit_expression(space, target, fit), 0.8, 0.88, "Looking at lips and lids")
+    fit, shown = yield from run(fit_expression(space, target, fit), 0.82, 0.88, "Looking at lips and lids")
     hair = yield from run(fit_under_hair(space, target, fit, shown), 0.88, 0.9, "Looking for hair")
     fit = hair.fit
     positions = picked(space, fit, target)

@@ -19,7 +19,8 @@ from .mouth_outline import NARROW, NEAR, mouth_arch
 ASIDE, STEP = 0.5, 0.25  # mm from column to column, and from place to place in one
 WIDE, FAR = 44.0, 9.0  # mm to either side of the middle, and above and below where lips are taken to meet
 BESIDE = 2.0  # mm above and below from which the crease is seen to be deeper
-STRAY = 0.3  # mm of depth that it must have more where it is `FAR` off
+FARTHER = 17.0  # mm: the same of lips of which nobody knows where about they are
+STRAY = 0.3  # mm of depth that it must have more where it is as far off as can be
 ALONG = 9  # columns over which it is averaged
 #: mm deep that the crease is between lips, and less beyond their corners. Of 38 closed mouths corners were 1.5 mm off on
 #: average, 5 at most; with .5 wrinkles went on with it (2.5 mm, 15 at most), with .8 a weak line ended 23 mm too soon.
@@ -51,27 +52,48 @@ def lip_line(target: Surface, marks, forward, scale: float = 1.0) -> LipLine | N
     marks : name -> (3,) mm, where about ``sto``, ``ch_l`` and ``ch_r`` lie; forward : (3,) unit vector, out of the face;
     scale : mm on the scan per mm of the reference
     """
-    aside = np.arange(-WIDE, WIDE + ASIDE / 2, ASIDE)
-    heights = np.arange(FAR, -FAR - STEP / 2, -STEP)
-    arch, up = mouth_arch(marks, "sto", forward, scale * aside)
-    places = arch[:, None] + scale * heights[:, None] * up
-    depth = depths(target, places.reshape(-1, 3), forward).reshape(places.shape[:2]) / scale
-    depth[depth > WITHIN] = np.nan
-    hole = missing_run(depth) > SLIT / STEP
-    worth = uniform_filter1d(np.where(hole, 0.0, crease(depth, int(BESIDE / STEP))), ALONG, axis=0)
-    way = best_way(worth - STRAY * (heights / FAR) ** 2)
-    columns = np.arange(len(aside))
-    worth, depth, places, hole = (grid[columns, way] for grid in (worth, depth, places, hole))
+    aside, worth, depth, places, hole = _followed(target, marks, forward, scale, FAR)
     if worth[np.abs(aside) < MIDDLE].mean() < PLAIN:
         return None
-    corners, middle = {}, len(aside) // 2
+    corners = {}
     for name, end in zip(CORNERS, line_ends(worth), strict=True):
         found = target.closest((places[end] - scale * _behind(depth, end) * forward)[None], NEAR * scale)
         if found.found[0] and not hole[max(end - AROUND, 0) : end + AROUND + 1].any():
             corners[name] = found.points[0]
     if not corners or np.ptp(line_ends(worth)) * ASIDE < NARROW:
         return None
-    return LipLine(corners, places[middle] - scale * _behind(depth, middle) * forward)
+    return LipLine(corners, _middle(depth, places, forward, scale))
+
+
+def lip_height(target: Surface, marks, forward, scale: float = 1.0) -> np.ndarray | None:
+    """(3,) mm: the middle of the nearest crease up to `FARTHER` above or below where the lips of a face that was laid on
+    the scan are, which may have missed them; None: there is none. Parameters as of `lip_line`."""
+    aside, worth, depth, places, _ = _followed(target, marks, forward, scale, FARTHER)
+    if worth[np.abs(aside) < MIDDLE].mean() < PLAIN:
+        return None
+    return _middle(depth, places, forward, scale)
+
+
+def _followed(target, marks, forward, scale, far):
+    """The line worth most up to ``far`` above and below the middle: mm aside (c,) of the middle; what each place of it is worth
+    and how deep it lies, mm (c,); the places (c, 3) mm in front of it; whether the scan has a hole there (c,)."""
+    aside = np.arange(-WIDE, WIDE + ASIDE / 2, ASIDE)
+    heights = np.arange(far, -far - STEP / 2, -STEP)
+    arch, up = mouth_arch(marks, "sto", forward, scale * aside)
+    places = arch[:, None] + scale * heights[:, None] * up
+    depth = depths(target, places.reshape(-1, 3), forward).reshape(places.shape[:2]) / scale
+    depth[depth > WITHIN] = np.nan
+    hole = missing_run(depth) > SLIT / STEP
+    worth = uniform_filter1d(np.where(hole, 0.0, crease(depth, int(BESIDE / STEP))), ALONG, axis=0)
+    way = best_way(worth - STRAY * (heights / far) ** 2)
+    columns = np.arange(len(aside))
+    return aside, *(grid[columns, way] for grid in (worth, depth, places, hole))
+
+
+def _middle(depth, places, forward, scale):
+    """(3,) mm, the middle of a line that was `_followed`."""
+    middle = len(depth) // 2
+    return places[middle] - scale * _behind(depth, middle) * forward
 
 
 def missing_run(depth) -> np.ndarray:

@@ -15,10 +15,11 @@ from ..progress import Progress, Work, portion
 from ..scan.face_match import face_template, surface_samples
 from ..scan.flat_cuts import beyond
 from .confidence import like_ears
+from .infant import infant_points, infant_space
 from .pose_search import LOOKING, STARTS, SURVIVORS, Pose, search_poses
 from .shape_fit import LEAST, TRIAL, NoFaceError, ShapeFit, fit_shape
 from .shape_space import ShapeSpace
-from .verdict import judged, likeness_of, misfit_of, weighed
+from .verdict import ODD, judged, likeness_of, misfit_of, weighed
 
 FITTING = "Fitting a face"
 NO_FACE = (
@@ -29,12 +30,15 @@ TRIAL_MODES = 40
 #: circumference in ANSUR, Gordon et al. 1989), and women's heads are 4 % smaller than men's; children's are smaller yet. Where
 #: a scan shows much of a head this tells little; where a face is cut off all round it keeps size and shape apart.
 SIZE = 0.05
+#: The same of children of the first years about one of one year.
+INFANT_SIZE = 0.12
 
 
 @dataclass(frozen=True)
 class Look:
     """One look for a face.
 
+    infant : whether it is an infant's face that is looked for
     size : of the reference's, the face that is looked for to begin with
     starts, survivors : see `search_poses`
     tried : placements that are looked at closely
@@ -47,6 +51,7 @@ class Look:
         above fits worse than the top of its head, round and whole, on which any dome of a forehead lies.
     """
 
+    infant: bool
     size: float
     starts: int
     survivors: int
@@ -58,15 +63,28 @@ class Look:
     relief: float
     weigh: float
 
+    @property
+    def deviation(self) -> float:
+        """Standard deviation of the head's size, as its logarithm."""
+        return INFANT_SIZE if self.infant else SIZE
+
 
 #: The second is taken if the first shows no plain face: a thorough one, which begins with a small face, because a large one
-#: on a small head finds no hold.
+#: on a small head finds no hold. If that shows none, the third looks for an infant's.
 LOOKS = (
-    Look(1.0, STARTS, SURVIVORS, 10, 3, 1.25, 5, 2, 0.53, 0.0),
-    Look(0.8, 1000, 400, 14, 4, np.inf, 4, 4, 0.7, 2.0),
+    Look(False, 1.0, STARTS, SURVIVORS, 10, 3, 1.25, 5, 2, 0.53, 0.0),
+    Look(False, 0.8, 1000, 400, 14, 4, np.inf, 4, 4, 0.7, 2.0),
+    Look(True, 0.7, 1000, 400, 14, 4, np.inf, 4, 4, 0.7, 2.0),
 )
+PARTS = (
+    (0.0, 0.5, 0.75),
+    (0.75, 0.83, 0.88),
+    (0.88, 0.94, 0.98),
+)  # of the work: trials of each look, and fits, begin and end
 PLAIN = 0.66  # relief from which on a first look is enough: faces have as much
 CLEAR = 0.75  # relief from which on nothing better is looked for
+#: mm on the reference by which the nose of an infant's face may lie lower than that of one laid on it upside down.
+LOWER = (0.0, 30.0, 60.0)
 TURNS = 3  # times that a fit is begun again
 #: Likeness of an ear (`like_ears`) below which a fit is begun again, and what the ears of both sides must gain by it. A CT
 #: scan's left ear had .59 to .68 where it was laid a centimetre or more beside its place, .88 to .9 in it.
@@ -74,16 +92,19 @@ LIKELY_EARS, LIKELIER = 0.75, 0.1
 
 
 def place_face(mesh: Mesh, reference: Head, space: ShapeSpace, unit_scales) -> Work:
-    """Work returning mm per unit of the mesh, one of ``unit_scales``, the `ShapeFit` and the `Surface` it lies on.
+    """Work returning mm per unit of the mesh, one of ``unit_scales``, the `ShapeFit`, the `Surface` it lies on and the
+    `ShapeSpace` it is of, ``space`` or that of an infant.
 
     Raises
     ------
     InputError : there is no face in it.
     """
-    few = space.reduced(TRIAL_MODES)
     template, samples = face_template(reference), surface_samples(mesh)
-    results = []
-    for look, (low, middle, high) in zip(LOOKS, ((0.0, 0.5, 0.8), (0.8, 0.9, 1.0)), strict=True):
+    seen = []
+    for look, (low, middle, high) in zip(LOOKS, PARTS, strict=True):
+        if look.infant:
+            space, template = infant_space(reference, space), infant_points(reference, template)
+        few = space.reduced(TRIAL_MODES)
         trials = []
         for k, scale in enumerate(unit_scales):
             part = (low + (middle - low) * (k + extra) / len(unit_scales) for extra in (0, 1))
@@ -91,11 +112,18 @@ def place_face(mesh: Mesh, reference: Head, space: ShapeSpace, unit_scales) -> W
         trials.sort(key=lambda t: t[0])
         good = sum(t[0] < look.worse * trials[0][0] for t in trials[: look.most])
         rivals = trials[: look.further]
-        results += yield from portion(_fits(look, reference, space, few, rivals, good), middle, high)
-        if results:
-            verdict, scale, fit, target = min(results, key=lambda t: t[0])
-            if not verdict.doubtful and (verdict.likeness > PLAIN or look is LOOKS[-1]):
-                return scale, fit, target
+        results = yield from portion(_fits(look, reference, space, few, rivals, good), middle, high)
+        seen += [(*result, space) for result in results]
+        if not seen:
+            continue
+        best = min(seen, key=_by_likeness if look.infant else lambda t: t[0])
+        verdict = best[0]
+        if not verdict.doubtful and (verdict.likeness > PLAIN or look is not LOOKS[0]):
+            if look.infant:
+                best = yield from portion(_or_from(reference, best, space, upside_down=True), high, 1.0)
+            elif verdict.bad > ODD:
+                best = yield from portion(_or_from(reference, best, infant_space(reference, space)), high, 1.0)
+            return best[1:]
     raise InputError(NO_FACE)
 
 
@@ -119,7 +147,7 @@ def _trials(look, reference, few, mesh, samples, template, scale) -> Work:
         outward = facing_out(few, target, pose)
         part = (0.5 + 0.5 * (k + extra) / len(poses) for extra in (0, 1))
         try:
-            fit = yield from run(fit_shape(few, outward, pose, TRIAL, every=3, size=SIZE), *part, LOOKING)
+            fit = yield from run(fit_shape(few, outward, pose, TRIAL, every=3, size=look.deviation), *part, LOOKING)
         except NoFaceError:
             continue
         misfit = weighed(misfit_of(few, fit), likeness_of(reference, few, fit), look.weigh)
@@ -140,7 +168,7 @@ def _fits(look, reference, space, few, rivals, good) -> Work:
     for k, (_, scale, fit, target) in enumerate(rivals):
         if k >= good and _any_face(results):
             break
-        work = fit_shape(space, target, fit.pose, coefficients=fit.coefficients, size=SIZE)
+        work = fit_shape(space, target, fit.pose, coefficients=fit.coefficients, size=look.deviation)
         try:
             fit = yield from run(work, *(0.5 * (k + np.arange(2)) / len(rivals)), FITTING)
         except NoFaceError:
@@ -158,9 +186,9 @@ def _fits(look, reference, space, few, rivals, good) -> Work:
                 return results
             done, before, start = next(parts), done, verdict
             try:
-                work = fit_shape(few, target, _lies(space, fit), TRIAL, every=3, size=SIZE)
+                work = fit_shape(few, target, _lies(space, fit), TRIAL, every=3, size=look.deviation)
                 fit = yield from run(work, before, (3 * before + done) / 4, FITTING)
-                work = fit_shape(space, target, fit.pose, coefficients=fit.coefficients, size=SIZE)
+                work = fit_shape(space, target, fit.pose, coefficients=fit.coefficients, size=look.deviation)
                 fit = yield from run(work, (3 * before + done) / 4, done, FITTING)
             except NoFaceError:
                 break
@@ -185,6 +213,53 @@ def with_likelier_ears(space: ShapeSpace, target: Surface, fit: ShapeFit) -> Wor
         return fit
     gain = sum(like_ears(space, again, target).values()) - sum(before.values())
     return again if gain > LIKELIER else fit
+
+
+def _or_from(reference, result, infants, upside_down=False) -> Work:
+    """Work returning ``result``, one of those of `_fits` with the `ShapeSpace` it is of, or one of the ``infants``' that is
+    begun from where it lies, if that is less bad, or from there upside down, if that is likelier.
+    """
+    _, scale, fit, target, space = result
+    pose = _lies(space, fit)
+    few = infants.reduced(TRIAL_MODES)
+    trials, starts = [], _turned_over(infants, pose, fit) if upside_down else [pose]
+    for k, start in enumerate(starts):
+        part = (0.5 * (k + extra) / len(starts) for extra in (0, 1))
+        try:
+            trial = yield from run(fit_shape(few, target, start, TRIAL, every=3, size=INFANT_SIZE), *part, FITTING)
+        except NoFaceError:
+            continue
+        trials.append((weighed(misfit_of(few, trial), likeness_of(reference, few, trial), LOOKS[-1].weigh), trial))
+    if not trials:
+        return result
+    _, trial = min(trials, key=lambda t: t[0])
+    try:
+        work = fit_shape(infants, target, trial.pose, coefficients=trial.coefficients, size=INFANT_SIZE)
+        fit = yield from run(work, 0.5, 1.0, FITTING)
+    except NoFaceError:
+        return result
+    rival = judged(reference, infants, fit, LOOKS[-1].relief), scale, fit, target, infants
+    return min(result, rival, key=_by_likeness if upside_down else lambda t: t[0])
+
+
+def _turned_over(space, pose, fit):
+    """Where a face may lie of which ``fit``, at ``pose``, is upside down: its nose is on the nose, or on the brow above it."""
+    nose = space.landmarks(space.points)["prn"]
+    turn = pose.turn * [-1.0, 1.0, -1.0]
+    places = (space.landmarks(fit.points)["prn"] - pose.scale * turn[:, 2] * low for low in LOWER)
+    return [replace(pose, turn=turn, shift=place - pose.scale * turn @ nose) for place in places]
+
+
+def _by_likeness(result):
+    """What ``result``, one of those of `_fits` with the `ShapeSpace` it is of, is sorted by where an infant's face may be: how
+    like a face the scan is, its ears included.
+
+    A round face upside down, the chin for a forehead, fits as well as a true one, or better where eyes are holes; but its
+    relief is less like a face's, and its ears are beside theirs.
+    """
+    verdict, _, fit, target, space = result
+    ears = np.mean(list(like_ears(space, fit, target).values()))
+    return verdict.doubtful, -verdict.likeness * (0.5 + ears)
 
 
 def _any_face(results):

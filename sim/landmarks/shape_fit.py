@@ -125,7 +125,7 @@ def fit_shape(
     coefficients (k,) : to begin with, of the first k modes; every : look at each so many-th point of the skin only;
     expression : what lips and lids are taken to do; told : what is known besides (None: nothing); hair (n,) bool : points
     that are known to lie under hair; where it is known that none does, the scalp counts as any skin
-    size : standard deviation of the head's size, as its logarithm, about the reference's (None: nothing is known of it)
+    size : standard deviation of the head's size, as its logarithm, about the likeliest (None: nothing is known of it)
 
     Raises
     ------
@@ -183,7 +183,7 @@ def fit_shape(
         prior[3:6] = 1e-6
         if size is not None:
             prior[6] = 1 / size**2
-            pull[6] -= prior[6] * np.log(scale)
+            pull[6] -= prior[6] * np.log(scale / space.size)
         system[np.diag_indices_from(system)] += prior
         pull[7:] += prior[7:] * usual
         if not expression.parted:

@@ -57,6 +57,7 @@ class ShapeSpace:
     hairy (n,) bool : skin on which hair grows: the scalp, and the nape behind the ears
     moving (n,) bool : skin that jaw and muscles of the lower face may move by more than `MOVED`
     names (k,) : landmarks; corners (k, 3), weights (k, 3) : where they ride on the points
+    size : what the likeliest head has of the points' own
     """
 
     vertices: np.ndarray
@@ -76,6 +77,12 @@ class ShapeSpace:
     names: tuple[str, ...]
     corners: np.ndarray
     weights: np.ndarray
+    size: float = 1.0
+
+    @property
+    def of_infants(self) -> bool:
+        """Whether it is that of `infant.infant_space`."""
+        return self.size < 1
 
     def shaped(self, coefficients: np.ndarray) -> np.ndarray:
         """(n, 3) mm, the skin with ``coefficients`` (m,)."""

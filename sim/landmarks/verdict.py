@@ -42,7 +42,7 @@ def judged(reference: Head, space: ShapeSpace, fit: ShapeFit, relief: float) -> 
     anything, and a face upside down, its nose on the nose, has as much relief as a true one.
     """
     misfit, likeness = misfit_of(space, fit), likeness_of(reference, space, fit)
-    shape, size = np.mean(fit.coefficients**2), (np.log(fit.pose.scale) / ODD_SIZE) ** 6
+    shape, size = np.mean(fit.coefficients**2), (np.log(fit.pose.scale / space.size) / ODD_SIZE) ** 6
     bad = weighed(misfit, likeness, 2) * (1 + shape) * (1 + size)
     plain = likeness > SURE and (share_of(space, fit) > HALF or bad < ODDER)
     most = LITTLE if plain else POOR

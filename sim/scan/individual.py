@@ -46,32 +46,39 @@ class Field:
 
 def draw_field(landmarks: dict[str, np.ndarray], rng: np.random.Generator, strength: float = 1.0) -> Field:
     """The field of one random woman or man; ``strength`` 1 is the variance of the norms, 0 the reference itself."""
-    points, functionals, deviations, sexes, of = _functionals(landmarks)
+    points, rows, deviations, sexes, of = _functionals(landmarks)
     draws = np.sqrt(1 - SIZE_SHARE) * rng.standard_normal(of.max() + 1) + np.sqrt(SIZE_SHARE) * rng.standard_normal()
     target = strength * np.clip(draws, -2.2, 2.2)[of] * deviations  # beyond, people look odd
-    kernel = _kernel(points, points)
-    gram = sum(functionals[:, :, k] @ kernel @ functionals[:, :, k].T for k in range(3))
     positions = np.array(list(landmarks.values()))
     patches = positions[rng.choice(len(positions), 14, replace=False)]
     uneven = strength * ASYMMETRY * rng.standard_normal(patches.shape)
     # The reference is the mean of both sexes, so either is half the difference away.
     target = target + strength * rng.choice([-0.5, 0.5]) * sexes
-    weights = np.linalg.solve(gram + SLACK**2 * np.diag(np.diag(gram)), target)
-    return Field(points, np.einsum("a,apk->pk", weights, functionals), patches, uneven)
+    return Field(points, smoothest(points, rows, target[:, None])[:, :, 0], patches, uneven)
 
 
 def variation(landmarks: dict[str, np.ndarray], points: np.ndarray) -> np.ndarray:
     """(n, 3, m) mm: how ``points`` (n, 3) of the reference move for one standard deviation of each of the m independent
     draws of `draw_field`: one per measurement, the person's size, and the sex. Patches of asymmetry are left out."""
-    sources, functionals, deviations, sexes, of = _functionals(landmarks)
-    kernel = _kernel(sources, sources)
-    gram = sum(functionals[:, :, k] @ kernel @ functionals[:, :, k].T for k in range(3))
+    sources, rows, deviations, sexes, of = _functionals(landmarks)
     draws = np.zeros((len(of), of.max() + 3))
     draws[np.arange(len(of)), of] = np.sqrt(1 - SIZE_SHARE) * deviations
     draws[:, -2] = np.sqrt(SIZE_SHARE) * deviations
     draws[:, -1] = 0.5 * sexes
-    weights = np.linalg.solve(gram + SLACK**2 * np.diag(np.diag(gram)), draws)
-    strength = np.einsum("am,apk->pkm", weights, functionals)
+    return displaced(points, sources, smoothest(sources, rows, draws))
+
+
+def smoothest(sources: np.ndarray, rows: np.ndarray, changes: np.ndarray) -> np.ndarray:
+    """(p, 3, m) strengths at ``sources`` (p, 3) mm of the smoothest fields by which measurements ``rows`` (a, p, 3),
+    `functionals`, change by ``changes`` (a, m) mm, as nearly as they agree."""
+    kernel = _kernel(sources, sources)
+    gram = sum(rows[:, :, k] @ kernel @ rows[:, :, k].T for k in range(3))
+    weights = np.linalg.solve(gram + SLACK**2 * np.diag(np.diag(gram)), changes)
+    return np.einsum("am,apk->pkm", weights, rows)
+
+
+def displaced(points: np.ndarray, sources: np.ndarray, strength: np.ndarray) -> np.ndarray:
+    """(n, 3, m) mm: how fields of that ``strength`` (p, 3, m) at ``sources`` (p, 3) mm move ``points`` (n, 3) mm."""
     return np.tensordot(_kernel(np.asarray(points, dtype=float), sources), strength, axes=1)
 
 
@@ -92,12 +99,25 @@ def _kernel(a, b):
 
 
 def _functionals(landmarks):
-    """Points (p, 3), functionals (a, p, 3) of displacements there; (a,) mm each: deviations, and men's mean less
-    women's; row of the table (a,).
+    """`functionals` of the `TABLE`, and (a,) mm each: deviations, and men's mean less women's; row of the table (a,)."""
+    points, rows, of, table = functionals(landmarks, TABLE)
+    deviations, sexes = (np.array([float(table[k][name]) for k in of]) for name in ("sd_mm", "sex_mm"))
+    return points, rows, deviations, sexes, of
 
-    A row with * stands for both sides, which are drawn alike.
+
+def functionals(
+    landmarks: dict[str, np.ndarray], path
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[dict[str, str]]]:
+    """The measurements of the table at ``path`` on a head with these ``landmarks`` (name -> (3,) mm).
+
+    Columns: ``at``, ``from`` : landmarks, the mean of those named, one joined of several by + being their middle; ``axis``
+    in which the first lie beyond the second: x, y, z, one with a minus, ``along`` the line between them or ``out`` to the
+    side. A row with * stands for both sides, which are alike.
+
+    Returns points (p, 3) mm; (a, p, 3), what each measurement is of their places, so that its sum with displacements there is
+    how it changes; row of the table (a,); and the table.
     """
-    points, index, rows, deviations, sexes, of = [], {}, [], [], [], []
+    points, index, rows, of = [], {}, [], []
 
     def at(text):
         """The indices of the points in ``text``: landmarks, or the middle of several joined by +."""
@@ -109,7 +129,7 @@ def _functionals(landmarks):
             found.append(index[name])
         return found
 
-    with open(TABLE, newline="", encoding="utf-8") as file:
+    with open(path, newline="", encoding="utf-8") as file:
         table = list(csv.DictReader(file))
     for number, row in enumerate(table):
         both = "*" in row["at"] + row["from"]
@@ -126,12 +146,10 @@ def _functionals(landmarks):
             else:
                 direction = (-1.0 if axis[0] == "-" else 1.0) * np.eye(3)["xyz".index(axis[-1])]
             rows.append((ends, direction))
-            deviations.append(float(row["sd_mm"]))
-            sexes.append(float(row["sex_mm"]))
             of.append(number)
-    functionals = np.zeros((len(rows), len(points), 3))
+    out = np.zeros((len(rows), len(points), 3))
     for k, (ends, direction) in enumerate(rows):
         for end, share in zip(ends, (1.0, -1.0), strict=True):
             for i in end:
-                functionals[k, i] += share * direction / len(end)
-    return np.array(points), functionals, np.array(deviations), np.array(sexes), np.array(of)
+                out[k, i] += share * direction / len(end)
+    return np.array(points), out, np.array(of), table

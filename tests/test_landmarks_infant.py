@@ -1,0 +1,194 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Infants' faces: their measurements, and how they are found where a grown one is no likely shape of them."""
+
+import csv
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from headshop.sim.adapt.closest import Surface
+from headshop.sim.anatomy.landmark_names import SKIN
+from headshop.sim.landmarks import infant, placed_face
+from headshop.sim.landmarks.find import find_landmarks
+from headshop.sim.landmarks.infant import infant_points, infant_space, with_mouth_in_place
+from headshop.sim.landmarks.lip_line import lip_height, lip_line
+from headshop.sim.landmarks.placed_face import LOOKS, PARTS
+from headshop.sim.landmarks.pose_search import Pose
+from headshop.sim.landmarks.shape_fit import fit_shape
+from headshop.sim.landmarks.shape_space import shape_space
+from headshop.sim.landmarks.verdict import ODD, Verdict, judged
+from headshop.sim.mesh_subdivision import drawn
+from headshop.sim.progress import Progress, finish
+from headshop.sim.scan.individual import draw_field
+
+FORWARD = np.array([0.0, -1.0, 0.0])
+UPSIDE_DOWN = np.diag([-1.0, 1.0, -1.0])  # turned about the axis out of the face
+
+
+@pytest.fixture(scope="module")
+def space(reference):
+    return shape_space(reference)
+
+
+@pytest.fixture(scope="module")
+def infants(reference, space):
+    return infant_space(reference, space)
+
+
+def _last(work):
+    """What a generator returns."""
+    try:
+        while True:
+            next(work)
+    except StopIteration as end:
+        return end.value
+
+
+def _laid(space, target, turn, nose):
+    """A fit of ``space`` begun with that turn, its nose at a place."""
+    shift = nose - space.size * turn @ space.landmarks(space.points)["prn"]
+    return _last(fit_shape(space, target, Pose(space.size, turn, shift, 0.0)))
+
+
+def test_an_infant_has_its_share_of_a_grown_ones_measurements(reference):
+    """Those that are plain distances in one direction, read from the table; the size is the mean of all shares."""
+    grown = reference.landmark_positions()
+    moved = infant_points(reference, np.array(list(grown.values())))
+    size = infant_space(reference, shape_space(reference)).size
+    child = dict(zip(grown, size * moved, strict=True))
+    with open(infant.TABLE, newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    shares = [float(row["of_adult"]) for row in rows]
+    assert min(shares) < size < max(shares)
+    plain = [r for r in rows if r["axis"] in "xyz" and r["at"] in grown and r["from"] in grown]
+    assert len(plain) > 15
+    for row in plain:
+        axis = "xyz".index(row["axis"])
+        of = (child[row["at"]] - child[row["from"]])[axis] / (grown[row["at"]] - grown[row["from"]])[axis]
+        assert of == pytest.approx(float(row["of_adult"]), abs=0.015), row["measurement"]
+
+
+def test_lips_are_found_farther_off_than_a_fit_that_knows_them_lies(reference):
+    skin = reference.skin
+    target = Surface(drawn(skin.faces, skin.vertices), skin.triangles)
+    marks = reference.landmark_positions()
+    above = {name: place + [0.0, 0.0, 12.0] for name, place in marks.items()}
+    line = lip_line(target, above, FORWARD)
+    assert line is None or abs(line.middle - marks["sto"])[2] > 2.0
+    assert abs(lip_height(target, above, FORWARD) - marks["sto"])[2] < 1.5
+    assert lip_height(target, {name: place + [0.0, 0.0, 60.0] for name, place in marks.items()}, FORWARD) is None
+
+
+def test_a_mouth_lower_than_infants_have_it_is_met(infants):
+    """A fit that has the lips where the likeliest infant has them finds those that lie 12 mm (of a grown head) lower."""
+    points = infants.size * infants.points
+    marks = infants.landmarks(points)
+    fit = _laid(infants, Surface(points, infants.triangles), np.eye(3), marks["prn"])
+    lower = np.exp(
+        -(((infants.points - infants.landmarks(infants.points)["sto"]) / [30.0, 30.0, 16.0]) ** 2).sum(axis=1) / 2
+    )
+    points = points - 12.0 * infants.size * lower[:, None] * [0.0, 0.0, 1.0]
+    target, mouth = Surface(points, infants.triangles), infants.landmarks(points)["sto"]
+    before = infants.landmarks(fit.points)["sto"]
+    after = infants.landmarks(_last(with_mouth_in_place(infants, target, fit)).points)["sto"]
+    assert abs(before - mouth)[2] > 6.0
+    assert abs(after - mouth)[2] < 1.0
+
+
+def test_an_infants_face_upside_down_is_turned_over(reference, infants):
+    """A round face lies on an infant's upside down as well; only ears and relief tell. It is begun again the other way up."""
+    points = infants.size * infants.points
+    target = Surface(points, infants.triangles)
+    nose = infants.landmarks(points)["prn"]
+    for wrong in (nose, nose + [0.0, 0.0, 35.0]):  # nose on the nose, or on the brow
+        fit = _laid(infants, target, UPSIDE_DOWN, wrong)
+        assert fit.pose.turn[2, 2] < -0.8
+        verdict = judged(reference, infants, fit, 0.7)._replace(doubtful=False)
+        result = (verdict, 1.0, fit, target, infants)
+        best = finish(placed_face._or_from(reference, result, infants, upside_down=True))
+        assert best[2].pose.turn[2, 2] > 0.95
+        assert np.linalg.norm(infants.landmarks(best[2].points)["prn"] - nose) < 1.5
+
+
+def test_size_counts_from_that_of_an_infant(reference, space, infants):
+    """An infant of its size is as little bad as a grown face of a grown one's; the same face grown is worse; and a fit that
+    knows about how large heads are comes back to its size."""
+    points = infants.size * infants.points
+    target, nose = Surface(points, infants.triangles), infants.landmarks(points)["prn"]
+    fit = _laid(infants, target, np.eye(3), nose)
+    bad = judged(reference, infants, fit, 0.7).bad
+    assert bad < 0.7 * judged(reference, replace(infants, size=1.2), fit, 0.7).bad
+    assert bad == pytest.approx(judged(reference, replace(infants, size=fit.pose.scale), fit, 0.7).bad, rel=0.01)
+    near = infants.size * infants.points[:, [2]] > nose[2]  # with little of the face, size is what it is said to be
+    few = Surface(points, infants.triangles[near[infants.triangles, 0].all(axis=1)])
+    start = Pose(
+        0.85 * infants.size, np.eye(3), nose - 0.85 * infants.size * infants.landmarks(infants.points)["prn"], 0.0
+    )
+    assert _last(fit_shape(infants, few, start, size=0.01)).pose.scale == pytest.approx(infants.size, rel=0.03)
+
+
+def test_a_face_is_laid_anew_as_an_infants_only_where_that_is_less_bad(reference, space, infants):
+    def kept(people, laid):
+        points = people.size * people.points
+        target = Surface(points, people.triangles)
+        fit = _laid(laid, target, np.eye(3), people.landmarks(points)["prn"])
+        result = (judged(reference, laid, fit, 0.7), 1.0, fit, target, laid)
+        return finish(placed_face._or_from(reference, result, infants))[4]
+
+    assert kept(space, laid=space) is space
+    assert kept(infants, laid=space) is infants
+
+
+def test_ears_tell_which_way_up_an_infants_face_is(monkeypatch):
+    ears = {"right": {"l": 0.9, "r": 0.9}, "wrong": {"l": 0.5, "r": 0.4}, "none": {"l": 0.0, "r": 0.0}}
+    monkeypatch.setattr(placed_face, "like_ears", lambda space, fit, target: ears[fit])
+
+    def best(*results):
+        return min(((v, 1.0, fit, None, None) for v, fit in results), key=placed_face._by_likeness)[2]
+
+    assert best((Verdict(False, 6.0, 0.78), "wrong"), (Verdict(False, 8.0, 0.76), "right")) == "right"
+    assert best((Verdict(False, 6.0, 0.78), "wrong"), (Verdict(True, 8.0, 0.9), "right")) == "wrong"
+    assert best((Verdict(False, 6.0, 0.9), "wrong"), (Verdict(False, 5.0, 0.72), "none")) == "wrong"
+
+
+@pytest.mark.parametrize(("bad", "asked"), [(ODD - 0.1, False), (ODD + 0.1, True)])
+def test_an_odd_face_may_be_an_infants(reference, space, monkeypatch, bad, asked):
+    """The face found is laid anew as an infant's if it is odd as a grown one, and only then."""
+    made = []
+
+    def work(value):
+        yield Progress(0.5, "")
+        return value
+
+    def other(reference, result, infants, upside_down=False):
+        made.append((infants.of_infants, upside_down))
+        return work((*result[:2], "infant", None, infants))
+
+    found = [(Verdict(False, bad, 0.8), 1.0, "grown", None)]
+    monkeypatch.setattr(placed_face, "_trials", lambda *rest: work([(1.0, 1.0, None, None)]))
+    monkeypatch.setattr(placed_face, "_fits", lambda *rest: work(found))
+    monkeypatch.setattr(placed_face, "_or_from", other)
+    _, fit, _, of = finish(placed_face.place_face(reference.skin, reference, space, (1.0,)))
+    assert (fit, of.of_infants) == (("infant", True) if asked else ("grown", False))
+    assert made == ([(True, False)] if asked else [])
+
+
+def test_an_infant_is_found_in_any_turn_by_the_look_for_one(reference, monkeypatch):
+    """By that look alone: a child with a year's measurements that is not the likeliest, of its size, turned at random."""
+    skin = reference.skin
+    rng = np.random.default_rng(7)
+    field = draw_field(reference.landmark_positions(), rng, 0.6)
+    size = infant_space(reference, shape_space(reference)).size
+    turn = np.linalg.qr(rng.standard_normal((3, 3)))[0]
+    turn *= np.sign(np.linalg.det(turn))
+
+    def child(points):
+        return size * (infant_points(reference, points) + field(points)) @ turn.T
+
+    monkeypatch.setattr(placed_face, "LOOKS", LOOKS[2:])
+    monkeypatch.setattr(placed_face, "PARTS", PARTS[2:])
+    found = finish(find_landmarks(skin.moved(child(skin.vertices)), reference))
+    truth = child(np.array([reference.landmark_positions()[n] for n in SKIN]))
+    off = np.linalg.norm(np.array([found.positions[n] for n in SKIN]) - truth, axis=1)
+    assert off.mean() < 2.5
