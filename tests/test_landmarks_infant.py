@@ -9,8 +9,7 @@ import pytest
 
 from headshop.sim.adapt.closest import Surface
 from headshop.sim.anatomy.landmark_names import SKIN
-from headshop.sim.landmarks import infant, placed_face
-from headshop.sim.landmarks.find import find_landmarks
+from headshop.sim.landmarks import find, infant, placed_face
 from headshop.sim.landmarks.infant import infant_points, infant_space, with_mouth_in_place
 from headshop.sim.landmarks.lip_line import lip_height, lip_line
 from headshop.sim.landmarks.placed_face import LOOKS, PARTS
@@ -67,6 +66,10 @@ def test_an_infant_has_its_share_of_a_grown_ones_measurements(reference):
         axis = "xyz".index(row["axis"])
         of = (child[row["at"]] - child[row["from"]])[axis] / (grown[row["at"]] - grown[row["from"]])[axis]
         assert of == pytest.approx(float(row["of_adult"]), abs=0.015), row["measurement"]
+    for row in (row for row in rows if row["axis"] == "along"):  # whichever way they lie on either
+        ends = row["at"].replace("*", "l"), row["from"].replace("*", "l")
+        of, whole = (np.linalg.norm(head[ends[0]] - head[ends[1]]) for head in (child, grown))
+        assert of / whole == pytest.approx(float(row["of_adult"]), abs=0.006), row["measurement"]
 
 
 def test_lips_are_found_farther_off_than_a_fit_that_knows_them_lies(reference):
@@ -104,7 +107,7 @@ def test_an_infants_face_upside_down_is_turned_over(reference, infants):
     for wrong in (nose, nose + [0.0, 0.0, 35.0]):  # nose on the nose, or on the brow
         fit = _laid(infants, target, UPSIDE_DOWN, wrong)
         assert fit.pose.turn[2, 2] < -0.8
-        verdict = judged(reference, infants, fit, 0.7)._replace(doubtful=False)
+        verdict = judged(reference, infants, fit, 0.7)._replace(doubtful=False, bad=0.1)  # as if it fitted well
         result = (verdict, 1.0, fit, target, infants)
         best = finish(placed_face._or_from(reference, result, infants, upside_down=True))
         assert best[2].pose.turn[2, 2] > 0.95
@@ -128,16 +131,19 @@ def test_size_counts_from_that_of_an_infant(reference, space, infants):
     assert _last(fit_shape(infants, few, start, size=0.01)).pose.scale == pytest.approx(infants.size, rel=0.03)
 
 
-def test_a_face_is_laid_anew_as_an_infants_only_where_that_is_less_bad(reference, space, infants):
-    def kept(people, laid):
-        points = people.size * people.points
-        target = Surface(points, people.triangles)
-        fit = _laid(laid, target, np.eye(3), people.landmarks(points)["prn"])
-        result = (judged(reference, laid, fit, 0.7), 1.0, fit, target, laid)
-        return finish(placed_face._or_from(reference, result, infants))[4]
-
-    assert kept(space, laid=space) is space
-    assert kept(infants, laid=space) is infants
+@pytest.mark.parametrize(
+    "bad, doubtful, taken", [(8.0, False, True), (8.9, False, False), (12.0, False, False), (8.0, True, False)]
+)
+def test_a_face_is_laid_anew_as_an_infants_only_where_that_is_plainly_less_bad(
+    reference, space, infants, monkeypatch, bad, doubtful, taken
+):
+    """Of a head cut off above the brows a child's face is, in some turns, a little less bad than its own."""
+    points = infants.size * infants.points
+    target = Surface(points, infants.triangles)
+    fit = _laid(space, target, np.eye(3), infants.landmarks(points)["prn"])
+    monkeypatch.setattr(placed_face, "judged", lambda *_: Verdict(doubtful, bad, 0.8))
+    best = finish(placed_face._or_from(reference, (Verdict(False, 10.0, 0.7), 1.0, fit, target, space), infants))
+    assert (best[4] is infants) == taken
 
 
 def test_ears_tell_which_way_up_an_infants_face_is(monkeypatch):
@@ -175,20 +181,29 @@ def test_an_odd_face_may_be_an_infants(reference, space, monkeypatch, bad, asked
 
 
 def test_an_infant_is_found_in_any_turn_by_the_look_for_one(reference, monkeypatch):
-    """By that look alone: a child with a year's measurements that is not the likeliest, of its size, turned at random."""
-    skin = reference.skin
+    """By that look alone: a child that is not the likeliest, small for its year, its mouth low, turned at random."""
+    skin, marks = reference.skin, reference.landmark_positions()
     rng = np.random.default_rng(7)
-    field = draw_field(reference.landmark_positions(), rng, 0.6)
-    size = infant_space(reference, shape_space(reference)).size
+    field = draw_field(marks, rng, 0.6)
+    size = 0.8 * infant_space(reference, shape_space(reference)).size
     turn = np.linalg.qr(rng.standard_normal((3, 3)))[0]
     turn *= np.sign(np.linalg.det(turn))
 
     def child(points):
-        return size * (infant_points(reference, points) + field(points)) @ turn.T
+        low = np.exp(-(((points - marks["sto"]) / [30.0, 40.0, 14.0]) ** 2).sum(axis=1) / 2)
+        moved = infant_points(reference, points) + field(points) - 12.0 * low[:, None] * [0.0, 0.0, 1.0]
+        return size * moved @ turn.T
 
+    def mouth(space, target, fit):
+        asked.append(space.of_infants)
+        return with_mouth_in_place(space, target, fit)
+
+    asked = []
     monkeypatch.setattr(placed_face, "LOOKS", LOOKS[2:])
     monkeypatch.setattr(placed_face, "PARTS", PARTS[2:])
-    found = finish(find_landmarks(skin.moved(child(skin.vertices)), reference))
-    truth = child(np.array([reference.landmark_positions()[n] for n in SKIN]))
+    monkeypatch.setattr(find, "with_mouth_in_place", mouth)
+    found = finish(find.find_landmarks(skin.moved(child(skin.vertices)), reference))
+    truth = child(np.array([marks[n] for n in SKIN]))
     off = np.linalg.norm(np.array([found.positions[n] for n in SKIN]) - truth, axis=1)
+    assert asked == [True]
     assert off.mean() < 2.5
