@@ -284,12 +284,12 @@ def test_a_place_hardly_like_a_face_is_taken_only_if_a_thorough_look_finds_no_be
 
     monkeypatch.setattr(placed_face, "_trials", trials)
 
-    def as_it_is(reference, result, *rest, **more):
+    def as_it_is(reference, result):
         yield Progress(0.5, "")
         return result
 
     monkeypatch.setattr(placed_face, "_fits", fits)
-    monkeypatch.setattr(placed_face, "_or_from", as_it_is)
+    monkeypatch.setattr(placed_face, "_or_infant", as_it_is)
     scan = reference.skin
     _, fit, _, _ = finish(placed_face.place_face(scan, reference, shape_space(reference), (1.0,)))
     assert len(taken) == looks

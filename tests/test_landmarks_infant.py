@@ -109,7 +109,7 @@ def test_an_infants_face_upside_down_is_turned_over(reference, infants):
         assert fit.pose.turn[2, 2] < -0.8
         verdict = judged(reference, infants, fit, 0.7)._replace(doubtful=False, bad=0.1)  # as if it fitted well
         result = (verdict, 1.0, fit, target, infants)
-        best = finish(placed_face._or_from(reference, result, infants, upside_down=True))
+        best = finish(placed_face._or_turned_over(reference, result))
         assert best[2].pose.turn[2, 2] > 0.95
         assert np.linalg.norm(infants.landmarks(best[2].points)["prn"] - nose) < 1.5
 
@@ -142,8 +142,8 @@ def test_a_face_is_laid_anew_as_an_infants_only_where_that_is_plainly_less_bad(
     target = Surface(points, infants.triangles)
     fit = _laid(space, target, np.eye(3), infants.landmarks(points)["prn"])
     monkeypatch.setattr(placed_face, "judged", lambda *_: Verdict(doubtful, bad, 0.8))
-    best = finish(placed_face._or_from(reference, (Verdict(False, 10.0, 0.7), 1.0, fit, target, space), infants))
-    assert (best[4] is infants) == taken
+    best = finish(placed_face._or_infant(reference, (Verdict(False, 10.0, 0.7), 1.0, fit, target, space)))
+    assert best[4].of_infants == taken
 
 
 def test_ears_tell_which_way_up_an_infants_face_is(monkeypatch):
@@ -161,23 +161,20 @@ def test_ears_tell_which_way_up_an_infants_face_is(monkeypatch):
 @pytest.mark.parametrize(("bad", "asked"), [(ODD - 0.1, False), (ODD + 0.1, True)])
 def test_an_odd_face_may_be_an_infants(reference, space, monkeypatch, bad, asked):
     """The face found is laid anew as an infant's if it is odd as a grown one, and only then."""
-    made = []
 
     def work(value):
         yield Progress(0.5, "")
         return value
 
-    def other(reference, result, infants, upside_down=False):
-        made.append((infants.of_infants, upside_down))
-        return work((*result[:2], "infant", None, infants))
+    def other(reference, result):
+        return work((*result[:2], "infant", None, infant_space(reference, result[4])))
 
     found = [(Verdict(False, bad, 0.8), 1.0, "grown", None)]
     monkeypatch.setattr(placed_face, "_trials", lambda *rest: work([(1.0, 1.0, None, None)]))
     monkeypatch.setattr(placed_face, "_fits", lambda *rest: work(found))
-    monkeypatch.setattr(placed_face, "_or_from", other)
+    monkeypatch.setattr(placed_face, "_or_infant", other)
     _, fit, _, of = finish(placed_face.place_face(reference.skin, reference, space, (1.0,)))
     assert (fit, of.of_infants) == (("infant", True) if asked else ("grown", False))
-    assert made == ([(True, False)] if asked else [])
 
 
 def test_an_infant_is_found_in_any_turn_by_the_look_for_one(reference, monkeypatch):

@@ -2,10 +2,9 @@
 """The face of an infant: what heads of the first years are like, of whom that of a grown one is no likely shape.
 
 Faces grow more than skulls do (Farkas, Posnick and Hreczko 1992), noses and jaws most of all, so that a child of one year has
-.6 to .9 of a grown person's measurements, each another share.
+half to nine tenths of a grown person's measurements, each another share.
 """
 
-import csv
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,18 +12,16 @@ import numpy as np
 
 from ..adapt.closest import Surface
 from ..anatomy.head import Head
-from ..scan.individual import displaced, functionals, smoothest
+from ..scan.individual import displaced, functionals, read_table, smoothest
 from .expression import line_of
 from .lip_line import lip_height
 from .shape_fit import CHANGE, ShapeFit, Told, fit_shape, part_of
 from .shape_space import ShapeSpace
 
-ROUNDS = 6
-MOUTH, TRIES = (
-    ("sto", "ls", "li", "ch_l", "ch_r"),
-    2,
-)  # what moves with the lips, and how many times they are looked for
 TABLE = Path(__file__).resolve().parents[2] / "assets" / "tables" / "infant_face.csv"
+ROUNDS = 6  # in which the head and the directions of its measurements come to agree
+MOUTH = ("sto", "ls", "li", "ch_l", "ch_r")  # what moves with the lips
+TRIES = 2  # times that lips are looked for
 
 
 def infant_space(reference: Head, space: ShapeSpace) -> ShapeSpace:
@@ -33,7 +30,7 @@ def infant_space(reference: Head, space: ShapeSpace) -> ShapeSpace:
     Its points are those of that head blown up to about the reference's size, its ``size`` what it has of that. Heads vary about
     it as grown ones do.
     """
-    return replace(space, points=infant_points(reference, space.points), size=_growth()[1])
+    return replace(space, points=infant_points(reference, space.points), size=_size(_shares(read_table(TABLE))))
 
 
 def infant_points(reference: Head, points: np.ndarray) -> np.ndarray:
@@ -43,24 +40,27 @@ def infant_points(reference: Head, points: np.ndarray) -> np.ndarray:
     Among all heads with the measurements of ``assets/tables/infant_face.csv`` it is the one that differs from the reference
     by the smoothest displacement (`sim.scan.individual`).
     """
-    share, size = _growth()
-    marks = reference.landmark_positions()
-    sources, rows, of, _ = functionals(marks, TABLE)
-    wanted = share[of] / size * _measured(rows, sources)
+    table, marks = read_table(TABLE), reference.landmark_positions()
+    shares = _shares(table)
+    sources, rows, of = functionals(marks, table)
+    wanted = shares[of] / _size(shares) * _measured(rows, sources)
     places = np.array(list(marks.values()))
-    for _ in range(ROUNDS):  # the directions of measurements change with the head
+    for _ in range(ROUNDS):
         change = wanted - _measured(rows, sources)
         strength = smoothest(sources, rows, change[:, None])
         moved = places + displaced(places, sources, strength)[:, :, 0]
-        rows = functionals(dict(zip(marks, moved, strict=True)), TABLE)[1]
+        rows = functionals(dict(zip(marks, moved, strict=True)), table)[1]
     return points + displaced(points, sources, strength)[:, :, 0]
 
 
-def _growth():
-    """What a child of one year has of each measurement of a grown person's, and their mean."""
-    with open(TABLE, newline="", encoding="utf-8") as file:
-        share = np.array([float(row["of_adult"]) for row in csv.DictReader(file)])
-    return share, float(np.exp(np.log(share).mean()))
+def _shares(table):
+    """(rows,) what a child of one year has of each measurement of a grown person's."""
+    return np.array([float(row["of_adult"]) for row in table])
+
+
+def _size(shares):
+    """Their mean, as factors have it."""
+    return float(np.exp(np.log(shares).mean()))
 
 
 def _measured(rows, places):
@@ -70,7 +70,7 @@ def _measured(rows, places):
 
 def with_mouth_in_place(space: ShapeSpace, target: Surface, fit: ShapeFit):
     """A generator: yields the fraction done, returns ``fit``, or one whose lips meet in the crease nearest to them if they
-    do not meet in one. How far below the nose a mouth is differs more among infants than in the norms of heads."""
+    do not meet in one. MakeHuman's babies have theirs some 10 mm, of a grown head, lower than the norms."""
     for k in range(TRIES):
         if line_of(space, fit, target) is not None:
             break

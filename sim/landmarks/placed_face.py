@@ -69,11 +69,8 @@ LOOKS = (
     Look(False, 0.8, 1000, 400, 14, 4, np.inf, 4, 4, 0.7, 2.0),
     Look(True, 0.7, 1000, 400, 14, 4, np.inf, 4, 4, 0.7, 2.0),
 )
-PARTS = (
-    (0.0, 0.5, 0.75),
-    (0.75, 0.83, 0.88),
-    (0.88, 0.94, 0.98),
-)  # of the work: trials of each look, and fits, begin and end
+#: Shares of the work at which trials of each look begin, and its fits begin and end.
+PARTS = ((0.0, 0.5, 0.75), (0.75, 0.83, 0.88), (0.88, 0.94, 0.98))
 PLAIN = 0.66  # relief from which on a first look is enough: faces have as much
 CLEAR = 0.75  # relief from which on nothing better is looked for
 #: mm on the reference by which the nose of an infant's face may lie lower than that of one laid on it upside down.
@@ -116,9 +113,9 @@ def place_face(mesh: Mesh, reference: Head, space: ShapeSpace, unit_scales) -> W
         verdict = best[0]
         if not verdict.doubtful and (verdict.likeness > PLAIN or look is not LOOKS[0]):
             if look.infant:
-                best = yield from portion(_or_from(reference, best, space, upside_down=True), high, 1.0)
+                best = yield from portion(_or_turned_over(reference, best), high, 1.0)
             elif verdict.bad > ODD:
-                best = yield from portion(_or_from(reference, best, infant_space(reference, space)), high, 1.0)
+                best = yield from portion(_or_infant(reference, best), high, 1.0)
             return best[1:]
     raise InputError(NO_FACE)
 
@@ -211,38 +208,41 @@ def with_likelier_ears(space: ShapeSpace, target: Surface, fit: ShapeFit) -> Wor
     return again if gain > LIKELIER else fit
 
 
-def _or_from(reference, result, infants, upside_down=False) -> Work:
-    """Work returning ``result``, one of those of `_fits` with the `ShapeSpace` it is of, or one of the ``infants``' that is
-    begun from where it lies, if that is plainly less bad, or from there upside down, if that is likelier.
-    """
+def _or_infant(reference, result) -> Work:
+    """Work returning ``result``, one of those of `_fits` with the `ShapeSpace` it is of, or one of an infant's face that is
+    begun from where it lies, if that is plainly less bad."""
     _, scale, fit, target, space = result
-    pose = _lies(space, fit)
-    few = infants.reduced(TRIAL_MODES)
-    trials, starts = [], _turned_over(infants, pose, fit) if upside_down else [pose]
-    for k, start in enumerate(starts):
-        part = (0.5 * (k + extra) / len(starts) for extra in (0, 1))
-        try:
-            trial = yield from run(fit_shape(few, target, start, TRIAL, every=3, size=SIZE), *part, FITTING)
-        except NoFaceError:
-            continue
-        trials.append((weighed(misfit_of(few, trial), likeness_of(reference, few, trial), LOOKS[-1].weigh), trial))
-    if not trials:
-        return result
-    _, trial = min(trials, key=lambda t: t[0])
+    infants = infant_space(reference, space)
+    rival = yield from _begun_from([_lies(space, fit)], reference, scale, target, infants)
+    return rival if rival and not rival[0].doubtful and rival[0].bad < LESS_BAD * result[0].bad else result
+
+
+def _or_turned_over(reference, result) -> Work:
+    """Work returning ``result``, as in `_or_infant`, or one that is begun from there upside down, if that is likelier."""
+    _, scale, fit, target, space = result
+    rival = yield from _begun_from(_turned_over(space, fit), reference, scale, target, space)
+    return min((result, rival), key=_by_likeness) if rival else result
+
+
+def _begun_from(starts, reference, scale, target, space) -> Work:
+    """Work returning a result as in `_or_infant` of the likeliest of ``starts``, poses; None: no face is there."""
+    few, trials = space.reduced(TRIAL_MODES), []
     try:
-        work = fit_shape(infants, target, trial.pose, coefficients=trial.coefficients, size=SIZE)
+        for k, start in enumerate(starts):
+            part = (0.5 * (k + extra) / len(starts) for extra in (0, 1))
+            trial = yield from run(fit_shape(few, target, start, TRIAL, every=3, size=SIZE), *part, FITTING)
+            trials.append((weighed(misfit_of(few, trial), likeness_of(reference, few, trial), LOOKS[-1].weigh), trial))
+        _, trial = min(trials, key=lambda t: t[0])
+        work = fit_shape(space, target, trial.pose, coefficients=trial.coefficients, size=SIZE)
         fit = yield from run(work, 0.5, 1.0, FITTING)
     except NoFaceError:
-        return result
-    rival = judged(reference, infants, fit, LOOKS[-1].relief), scale, fit, target, infants
-    if upside_down:
-        return min(result, rival, key=_by_likeness)
-    return rival if not rival[0].doubtful and rival[0].bad < LESS_BAD * result[0].bad else result
+        return None
+    return judged(reference, space, fit, LOOKS[-1].relief), scale, fit, target, space
 
 
-def _turned_over(space, pose, fit):
-    """Where a face may lie of which ``fit``, at ``pose``, is upside down: its nose is on the nose, or on the brow above it."""
-    nose = space.landmarks(space.points)["prn"]
+def _turned_over(space, fit):
+    """Where a face may lie that ``fit`` has upside down, poses: its nose is on the nose, or lower, from that on the brow."""
+    pose, nose = _lies(space, fit), space.landmarks(space.points)["prn"]
     turn = pose.turn * [-1.0, 1.0, -1.0]
     places = (space.landmarks(fit.points)["prn"] - pose.scale * turn[:, 2] * low for low in LOWER)
     return [replace(pose, turn=turn, shift=place - pose.scale * turn @ nose) for place in places]

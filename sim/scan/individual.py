@@ -100,22 +100,27 @@ def _kernel(a, b):
 
 def _functionals(landmarks):
     """`functionals` of the `TABLE`, and (a,) mm each: deviations, and men's mean less women's; row of the table (a,)."""
-    points, rows, of, table = functionals(landmarks, TABLE)
+    table = read_table(TABLE)
+    points, rows, of = functionals(landmarks, table)
     deviations, sexes = (np.array([float(table[k][name]) for k in of]) for name in ("sd_mm", "sex_mm"))
     return points, rows, deviations, sexes, of
 
 
-def functionals(
-    landmarks: dict[str, np.ndarray], path
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[dict[str, str]]]:
-    """The measurements of the table at ``path`` on a head with these ``landmarks`` (name -> (3,) mm).
+def read_table(path) -> list[dict[str, str]]:
+    """Rows of a table of measurements, by column."""
+    with open(path, newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def functionals(landmarks: dict[str, np.ndarray], table) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The measurements of a ``table`` (`read_table`) on a head with these ``landmarks`` (name -> (3,) mm).
 
     Columns: ``at``, ``from`` : landmarks, the mean of those named, one joined of several by + being their middle; ``axis``
     in which the first lie beyond the second: x, y, z, one with a minus, ``along`` the line between them or ``out`` to the
     side. A row with * stands for both sides, which are alike.
 
     Returns points (p, 3) mm; (a, p, 3), what each measurement is of their places, so that its sum with displacements there is
-    how it changes; row of the table (a,); and the table.
+    how it changes; and row of the table (a,).
     """
     points, index, rows, of = [], {}, [], []
 
@@ -129,8 +134,6 @@ def functionals(
             found.append(index[name])
         return found
 
-    with open(path, newline="", encoding="utf-8") as file:
-        table = list(csv.DictReader(file))
     for number, row in enumerate(table):
         both = "*" in row["at"] + row["from"]
         for side, sign in (("l", 1.0), ("r", -1.0)) if both else (("", 1.0),):
@@ -152,4 +155,4 @@ def functionals(
         for end, share in zip(ends, (1.0, -1.0), strict=True):
             for i in end:
                 out[k, i] += share * direction / len(end)
-    return np.array(points), out, np.array(of), table
+    return np.array(points), out, np.array(of)
