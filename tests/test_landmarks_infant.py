@@ -10,8 +10,11 @@ import pytest
 from headshop.sim.adapt.closest import Surface
 from headshop.sim.anatomy.landmark_names import SKIN
 from headshop.sim.landmarks import find, infant, placed_face
+from headshop.sim.landmarks import first_look as first
+from headshop.sim.landmarks.first_look import first_look
 from headshop.sim.landmarks.infant import infant_points, infant_space, with_mouth_in_place
 from headshop.sim.landmarks.lip_line import lip_height, lip_line
+from headshop.sim.landmarks.picked import moved
 from headshop.sim.landmarks.placed_face import LOOKS, PARTS
 from headshop.sim.landmarks.pose_search import Pose
 from headshop.sim.landmarks.shape_fit import fit_shape
@@ -177,19 +180,72 @@ def test_an_odd_face_may_be_an_infants(reference, space, monkeypatch, bad, asked
     assert (fit, of.of_infants) == (("infant", True) if asked else ("grown", False))
 
 
+def _child(reference, seed, size, low):
+    """A map of points of the reference to those of a child that is not the likeliest: ``size`` times as large as that, its
+    mouth ``low`` mm (of a grown head) lower."""
+    marks = reference.landmark_positions()
+    field = draw_field(marks, np.random.default_rng(seed), 0.6)
+    size = size * infant_space(reference, shape_space(reference)).size
+
+    def child(points):
+        near = np.exp(-(((points - marks["sto"]) / [30.0, 40.0, 14.0]) ** 2).sum(axis=1) / 2)
+        return size * (infant_points(reference, points) + field(points) - low * near[:, None] * [0.0, 0.0, 1.0])
+
+    return child
+
+
+def _scanned(reference, child):
+    """What `_child` makes of the reference: the scan, and all landmarks."""
+    skin, marks = reference.skin, reference.landmark_positions()
+    scan = Surface(child(drawn(skin.faces, skin.vertices)), skin.triangles, smooth=2.0)
+    return scan, dict(zip(SKIN, child(np.array([marks[n] for n in SKIN])), strict=True))
+
+
+@pytest.mark.parametrize(("low", "nearer"), [(12.0, 2.5), (20.0, 3.0)])
+def test_landmarks_given_on_an_infant_tell_the_others(reference, low, nearer):
+    """Ten of them, none of the mouth, of a child whose mouth is lower than infants' usually are."""
+    scan, truth = _scanned(reference, _child(reference, 9, 0.8, low))
+    ten = [*(f"{mark}_{side}" for mark in ("en", "ex", "al", "t") for side in "lr"), "prn", "gn"]
+    guessed = finish(first_look(reference, scan, {n: truth[n] for n in ten})).guessed
+    for name in ("li", "ch_l", "ch_r"):
+        assert np.linalg.norm(guessed[name] - truth[name]) < nearer, name
+
+
+@pytest.mark.parametrize("size", [0.8, 1.35])
+def test_what_somebody_picked_on_an_infant_is_told(reference, monkeypatch, size):
+    """And nothing that was found, nothing of hair and skull, and nothing of a grown head."""
+    scan, truth = _scanned(reference, _child(reference, 9, size, 0.0))
+    asked = []
+
+    def spy(space, target, pose, told=None):
+        asked.append((space, pose, told))
+        return fit_shape(space, target, pose, told=told)
+
+    monkeypatch.setattr(first, "fit_shape", spy)
+    finish(first_look(reference, scan, truth, found=("ch_l", "g", "t_r")))
+    ((space, pose, told),) = asked
+    assert space.of_infants == (size < 1)
+    if size > 1:
+        assert told is None
+        return
+    names = [n for n in truth if n not in ("ch_l", "g", "t_r") and n.partition("_")[0] not in ("v", "op", "eu", "tr")]
+    assert len(told.places) == len(names)
+    own = dict(zip(map(tuple, told.corners), told.places, strict=True))
+    for name in ("prn", "ch_r", "sa_l"):
+        place = own[tuple(space.corners[space.names.index(name)])]
+        picked = pose.scale * pose.turn @ moved(name)
+        assert np.linalg.norm(place + picked - truth[name]) < 1e-9
+
+
 def test_an_infant_is_found_in_any_turn_by_the_look_for_one(reference, monkeypatch):
     """By that look alone: a child that is not the likeliest, small for its year, its mouth low, turned at random."""
     skin, marks = reference.skin, reference.landmark_positions()
-    rng = np.random.default_rng(7)
-    field = draw_field(marks, rng, 0.6)
-    size = 0.8 * infant_space(reference, shape_space(reference)).size
-    turn = np.linalg.qr(rng.standard_normal((3, 3)))[0]
+    turn = np.linalg.qr(np.random.default_rng(7).standard_normal((3, 3)))[0]
     turn *= np.sign(np.linalg.det(turn))
+    upright = _child(reference, 7, 0.8, 12.0)
 
     def child(points):
-        low = np.exp(-(((points - marks["sto"]) / [30.0, 40.0, 14.0]) ** 2).sum(axis=1) / 2)
-        moved = infant_points(reference, points) + field(points) - 12.0 * low[:, None] * [0.0, 0.0, 1.0]
-        return size * moved @ turn.T
+        return upright(points) @ turn.T
 
     def mouth(space, target, fit):
         asked.append(space.of_infants)

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..adapt.closest import Surface
+from ..adapt.ears import EAR_MARKS
 from ..adapt.scan_surface import NO_SKIN
 from ..adapt.skin_fit import SkinFit
 from ..adapt.thin_plate_spline import similarity
@@ -20,10 +21,12 @@ from .confidence import in_mid_air
 from .expression import fit_expression
 from .held_by_lips import held_by_lips
 from .hidden_skin import UNSEEN, hidden_skin, unseen_scalp, with_hidden_skin
+from .infant import likelier_space, with_mouth_in_place
 from .lids_told import lids_told
+from .picked import moved, picked
 from .placed_face import facing_out, run
 from .pose_search import Pose
-from .shape_fit import NoFaceError, fit_shape
+from .shape_fit import NoFaceError, Told, fit_shape
 from .shape_space import shape_space
 from .under_hair import EAR, SKULL, fit_under_hair, hair_over, in_face
 
@@ -75,13 +78,17 @@ def first_look(
     if len(names) < FEWEST:
         return FirstLook(given, target, target)
     space = shape_space(reference)
-    matrix, shift = similarity([rest[name] for name in names], [given[name] for name in names])
-    scale = np.cbrt(np.linalg.det(matrix))
-    pose = Pose(scale, matrix / scale, shift, 0.0)
+    pose, told = _pose(rest, given, names), None
+    space = likelier_space(reference, space, pose.scale)
+    if space.of_infants:
+        pose = _pose(space.landmarks(space.points), given, names)
+        told = _told_of(space, pose, {n: given[n] for n in names if n not in found})
     target = facing_out(space, target, pose)
     coarse = target.coarser()
     try:
-        fit = yield from run(fit_shape(space, coarse, pose), 0.0, 0.6, LOOKING)
+        fit = yield from run(fit_shape(space, coarse, pose, told=told), 0.0, 0.55, LOOKING)
+        if space.of_infants:
+            fit = yield from run(with_mouth_in_place(space, coarse, fit), 0.55, 0.6, LOOKING)
         fit, shown = yield from run(fit_expression(space, coarse, fit), 0.6, 0.9, LOOKING)
         skull = [n for n in names if n.partition("_")[0] in SKULL and n not in found]
         off = in_mid_air(target, np.reshape([given[n] for n in skull], (-1, 3)))
@@ -95,6 +102,7 @@ def first_look(
     untold = (*UNTOLD, "sto") if shown.parted else UNTOLD
     laid, skull = space.landmarks(hair.fit.points), space.landmarks(hair.scalp.points)
     laid |= {n: p for n, p in skull.items() if n.partition("_")[0] in SKULL}
+    laid |= {n: p for n, p in picked(space, hair.fit, coarse).items() if n.partition("_")[0] in EAR_MARKS}
     guessed = {n: p for n, p in laid.items() if n not in landmarks and n.partition("_")[0] not in untold}
     held, covered = (np.zeros(len(each), dtype=bool) for each in (target.triangles, space.points))
     kept = "hair" not in leave_out and hair.covered.any()
@@ -113,3 +121,19 @@ def first_look(
     filled = with_hidden_skin(space, hair.scalp, unseen & no_ear, filled, UNSEEN)
     out = {"held_by_lips": float(target.area[held].sum()), "hair": float(target.area[shows].sum())}
     return FirstLook(landmarks, left, filled, lips, out, space.vertices[hidden | covered | unseen], guessed)
+
+
+def _pose(marks, given, names):
+    """How a head with landmarks ``marks`` lies if ``names`` are where they are ``given``."""
+    matrix, shift = similarity([marks[name] for name in names], [given[name] for name in names])
+    scale = np.cbrt(np.linalg.det(matrix))
+    return Pose(scale, matrix / scale, shift, 0.0)
+
+
+def _told_of(space, pose, marks):
+    """What the ``marks`` that somebody picked tell of an infant's face at ``pose``.
+
+    Infants' faces differ from the one that is likeliest by more than grown ones, for which data alone tell as much.
+    """
+    clear = {n: p for n, p in marks.items() if n.partition("_")[0] not in (*UNTOLD, *SKULL)}
+    return Told.of(space, {n: p - pose.scale * pose.turn @ moved(n) for n, p in clear.items()}) if clear else None

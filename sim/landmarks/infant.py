@@ -33,6 +33,13 @@ def infant_space(reference: Head, space: ShapeSpace) -> ShapeSpace:
     return replace(space, points=infant_points(reference, space.points), size=_size(_shares(read_table(TABLE))))
 
 
+def likelier_space(reference: Head, space: ShapeSpace, size: float) -> ShapeSpace:
+    """``space``, the shape space of the ``reference``, or `infant_space`, whichever has likelier heads that are ``size`` times
+    the reference."""
+    infants = infant_space(reference, space)
+    return infants if abs(np.log(size / infants.size)) < abs(np.log(size / space.size)) else space
+
+
 def infant_points(reference: Head, points: np.ndarray) -> np.ndarray:
     """(n, 3) mm: where ``points`` (n, 3) of the ``reference`` lie on the head of a child of one year that is blown up to about
     its size, by the mean growth of the measurements.
