@@ -78,10 +78,11 @@ def first_look(
     if len(names) < FEWEST:
         return FirstLook(given, target, target)
     space = shape_space(reference)
-    pose, told = _pose(rest, given, names), None
+    matrix, shift = similarity([rest[name] for name in names], [given[name] for name in names])
+    scale = np.cbrt(np.linalg.det(matrix))
+    pose, told = Pose(scale, matrix / scale, shift, 0.0), None
     space = likelier_space(reference, space, pose.scale)
     if space.of_infants:
-        pose = _pose(space.landmarks(space.points), given, names)
         told = _told_of(space, pose, {n: given[n] for n in names if n not in found})
     target = facing_out(space, target, pose)
     coarse = target.coarser()
@@ -121,13 +122,6 @@ def first_look(
     filled = with_hidden_skin(space, hair.scalp, unseen & no_ear, filled, UNSEEN)
     out = {"held_by_lips": float(target.area[held].sum()), "hair": float(target.area[shows].sum())}
     return FirstLook(landmarks, left, filled, lips, out, space.vertices[hidden | covered | unseen], guessed)
-
-
-def _pose(marks, given, names):
-    """How a head with landmarks ``marks`` lies if ``names`` are where they are ``given``."""
-    matrix, shift = similarity([marks[name] for name in names], [given[name] for name in names])
-    scale = np.cbrt(np.linalg.det(matrix))
-    return Pose(scale, matrix / scale, shift, 0.0)
 
 
 def _told_of(space, pose, marks):
