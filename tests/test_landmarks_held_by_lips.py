@@ -148,7 +148,14 @@ def test_parted_lips_are_told_where_their_landmarks_are_not_given(reference, mar
     assert set(look.lips) == set(MARKS)
     assert parted_lips(reference, scan, given) is None
     found = parted_lips(reference, scan, given, look.lips)
-    assert found is not None and np.linalg.norm(found.edges[0] - found.edges[1]) > 4
+    upper, lower = found.edges.reshape(2, -1, 3)
+    assert np.linalg.norm(upper - lower, axis=1).max() > 6
+    # Where the lower lip hangs below the straight ways from its middle to the corners, those end within the gap.
+    middle, thin = np.abs(upper[:, 0]).argmin(), np.array([0.0, 0.0, 1.0])
+    at_edges = look.lips | {"ls": upper[middle] + thin, "li": lower[middle] - thin}
+    again = parted_lips(reference, scan, given, at_edges)
+    np.testing.assert_allclose(again.edges.reshape(2, -1, 3)[1][:, 2].min(), lower[:, 2].min(), atol=1.0)
+    assert parted_lips(reference, scan, given | at_edges) is None  # lips that are not known to be apart
     assert finish(first_look(reference, Surface(*face, smooth=2.0), marks)).lips is None
 
 

@@ -175,6 +175,25 @@ def test_edges_are_found_aside_of_the_middle_too_however_round_the_mouth(half, t
     np.testing.assert_allclose(edges[:, :, 2], np.stack([height, -height], axis=1), atol=2.0)
 
 
+def test_edges_of_a_lower_lip_that_hangs_are_found_along_an_arch():
+    """The half-moon of a broad smile: straight ways from the lower lip's middle to the corners are within it."""
+    face, half, tall = _face(gap=False), 25.0, 12.0
+    x, _, z = face.vertices[face.triangles].mean(axis=1).T
+    face = Surface(face.vertices, face.triangles[(z > 0) | (z < -tall * (1 - (x / half) ** 2)) | (np.abs(x) > half)])
+    marks = {
+        "ls": (0, 0, 4),
+        "li": (0, 0, -tall - 2),
+        "ch_l": (half, half**2 / 40, 0),
+        "ch_r": (-half, half**2 / 40, 0),
+    }
+    marks = {name: np.array(place, dtype=float) for name, place in marks.items()}
+    shares = np.array([-0.3, -0.2, 0.2, 0.3])
+    assert np.isnan(lip_edges(face, marks, FORWARD, shares)).all()
+    edges = lip_edges(face, marks, FORWARD, shares, arched=True)
+    np.testing.assert_allclose(edges[:, 0, 2], 0, atol=1.5)
+    np.testing.assert_allclose(edges[:, 1, 2], -tall * (1 - shares**2), atol=1.5)
+
+
 def test_closed_lips_have_no_outline():
     assert mouth_outline(_face(gap=False), _guess(), FORWARD) is None
 

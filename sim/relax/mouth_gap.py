@@ -27,7 +27,7 @@ BRIDGED, ABOUT = 1.0, 6
 MIDDLE = 0.3  # shares of the way to the corner up to here tell how wide the mouth is open
 
 
-def lip_edges(target: Surface, given, forward, shares):
+def lip_edges(target: Surface, given, forward, shares, arched: bool = False):
     """Edges of the upper and the lower lip (k, 2, 3) mm, NaN where there are none.
 
     Parameters
@@ -35,12 +35,13 @@ def lip_edges(target: Surface, given, forward, shares):
     given : landmarks, name -> (3,) mm; without all of `MARKS` nothing is found
     forward : (3,) unit vector, out of the face
     shares : (k,) where to look: share of the way from the middle of the mouth to its left corner (to its right: below 0)
+    arched : look along an ellipse, whatever the height of the mouth
     """
     shares = np.asarray(shares, dtype=float)
     out = np.full((len(shares), 2, 3), np.nan)
     if any(name not in given for name in MARKS):
         return out
-    lines, depth = profiles(target, given, forward, shares)
+    lines, depth = profiles(target, given, forward, shares, arched)
     for k, (line, behind) in enumerate(zip(lines, depth, strict=True)):
         length = np.linalg.norm(line[-1] - line[0])
         found = first_and_last_edge(behind, int(SPECK / length * STEPS))
@@ -52,13 +53,13 @@ def lip_edges(target: Surface, given, forward, shares):
     return out
 
 
-def profiles(target: Surface, given, forward, shares):
+def profiles(target: Surface, given, forward, shares, arched: bool = False):
     """Lines (k, STEPS, 3) mm from the upper lip to the lower one at ``shares`` (k,), and how deep (k, STEPS) mm the scan lies
     behind them, see `lip_edges`."""
     aside = np.abs(shares)[:, None]
     corner = np.where(shares[:, None] > 0, given["ch_l"], given["ch_r"])
     middle, width = (given["ch_l"] + given["ch_r"]) / 2, np.linalg.norm(given["ch_l"] - given["ch_r"])
-    round_ = np.clip((np.linalg.norm(given["ls"] - given["li"]) / width - OVAL) / (ROUND - OVAL), 0, 1)
+    round_ = float(arched) or np.clip((np.linalg.norm(given["ls"] - given["li"]) / width - OVAL) / (ROUND - OVAL), 0, 1)
     over = (1 - round_) * (1 - aside) + round_ * np.sqrt(np.clip(1 - aside**2, 0, None))
     upper, lower = (middle + aside * (corner - middle) + over * (given[name] - middle) for name in ("ls", "li"))
     lines = upper[:, None] + np.linspace(0, 1, STEPS)[:, None] * (lower - upper)[:, None]

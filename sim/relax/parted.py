@@ -57,10 +57,15 @@ def parted_lips(reference: Head, target: Surface, given, lips=None) -> PartedLip
     matrix, _ = similarity(marks, goal)
     forward = -matrix[:, 1] / np.linalg.norm(matrix[:, 1])
     first, about = np.array([-0.25, 0.0, 0.25]), (lips or {}) | given
-    if opening(lip_edges(target, about, forward, first), first) < (AJAR if lips else APART):
+    arched, least = False, AJAR if lips else APART
+    if lips and opening(lip_edges(target, about, forward, first), first) < least:
+        arched = (
+            True  # a broad smile's lower lip hangs below the straight ways to the corners, which end in the gap then
+        )
+    if opening(lip_edges(target, about, forward, first, arched), first) < least:
         return None
     looked = np.linspace(-ASIDE, ASIDE, LINES)
-    edges = lip_edges(target, about, forward, looked)
+    edges = lip_edges(target, about, forward, looked, arched)
     pairs, shares = rim_pairs(reference)
     edges = smoothed(edges, looked, shares)
     seen = np.isfinite(edges).all(axis=(1, 2)) & (np.linalg.norm(edges[:, 0] - edges[:, 1], axis=1) > TOLD)
