@@ -57,11 +57,9 @@ def parted_lips(reference: Head, target: Surface, given, lips=None) -> PartedLip
     matrix, _ = similarity(marks, goal)
     forward = -matrix[:, 1] / np.linalg.norm(matrix[:, 1])
     first, about = np.array([-0.25, 0.0, 0.25]), (lips or {}) | given
-    arched, least = False, AJAR if lips else APART
-    if lips and opening(lip_edges(target, about, forward, first), first) < least:
-        arched = (
-            True  # a broad smile's lower lip hangs below the straight ways to the corners, which end in the gap then
-        )
+    least = AJAR if lips else APART
+    # The lower lip of a broad smile hangs below the straight ways to the corners, which end in the gap then.
+    arched = bool(lips) and opening(lip_edges(target, about, forward, first), first) < least
     if opening(lip_edges(target, about, forward, first, arched), first) < least:
         return None
     looked = np.linspace(-ASIDE, ASIDE, LINES)
