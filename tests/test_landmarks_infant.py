@@ -211,10 +211,16 @@ def test_landmarks_given_on_an_infant_tell_the_others(reference, low, nearer):
         assert np.linalg.norm(guessed[name] - truth[name]) < nearer, name
 
 
-@pytest.mark.parametrize("size", [0.8, 1.35])
-def test_what_somebody_picked_on_an_infant_is_told(reference, monkeypatch, size):
-    """And nothing that was found, nothing of hair and skull, and nothing of a grown head."""
-    scan, truth = _scanned(reference, _child(reference, 9, size, 0.0))
+@pytest.mark.parametrize("of", ["a child", "a large child", "a small cast of a grown head"])
+def test_what_somebody_picked_on_an_infant_is_told(reference, monkeypatch, of):
+    """And nothing that was found, nothing of hair and skull, and nothing of a head with a grown one's size or face."""
+    cast = draw_field(reference.landmark_positions(), np.random.default_rng(9), 0.6)
+    maps = {
+        "a child": _child(reference, 9, 0.8, 0.0),
+        "a large child": _child(reference, 9, 1.35, 0.0),
+        "a small cast of a grown head": lambda points: 0.65 * (points + cast(points)),
+    }
+    scan, truth = _scanned(reference, maps[of])
     asked = []
 
     def spy(space, target, pose, told=None):
@@ -224,8 +230,8 @@ def test_what_somebody_picked_on_an_infant_is_told(reference, monkeypatch, size)
     monkeypatch.setattr(first, "fit_shape", spy)
     finish(first_look(reference, scan, truth, found=("ch_l", "g", "t_r")))
     ((space, pose, told),) = asked
-    assert space.of_infants == (size < 1)
-    if size > 1:
+    assert space.of_infants == (of == "a child")
+    if of != "a child":
         assert told is None
         return
     names = [n for n in truth if n not in ("ch_l", "g", "t_r") and n.partition("_")[0] not in ("v", "op", "eu", "tr")]

@@ -71,7 +71,7 @@ def first_look(
     """Work returning the `FirstLook` at the scan ``target`` with the landmarks ``given`` (name -> (3,) mm).
 
     leave_out : of `NO_SKIN`; what the lips hold, or hair, is taken for skin where it is not among them
-    found : names of those given that nobody picked: in mid-air they are guesses
+    found : names of those given that nobody picked: in mid-air they are guesses, and of an infant they tell nothing
     """
     rest = reference.landmark_positions()
     names = [name for name in given if name in rest]
@@ -81,9 +81,10 @@ def first_look(
     matrix, shift = similarity([rest[name] for name in names], [given[name] for name in names])
     scale = np.cbrt(np.linalg.det(matrix))
     pose, told = Pose(scale, matrix / scale, shift, 0.0), None
-    space = likelier_space(reference, space, pose.scale)
+    clear = {n: given[n] for n in names if n.partition("_")[0] not in (*UNTOLD, *SKULL)}
+    space = likelier_space(reference, space, pose.scale, clear)
     if space.of_infants:
-        told = _told_of(space, pose, {n: given[n] for n in names if n not in found})
+        told = _told_of(space, pose, {n: p for n, p in clear.items() if n not in found})
     target = facing_out(space, target, pose)
     coarse = target.coarser()
     try:
@@ -125,10 +126,9 @@ def first_look(
 
 
 def _told_of(space, pose, marks):
-    """What the ``marks`` that somebody picked tell of an infant's face at ``pose``.
+    """What the ``marks`` that somebody picked tell of an infant's face at ``pose``; None: there are none.
 
     An infant's face may differ by much from the likeliest, and a fit without them lays its ears amiss. On grown faces they
     changed next to nothing.
     """
-    clear = {n: p for n, p in marks.items() if n.partition("_")[0] not in (*UNTOLD, *SKULL)}
-    return Told.of(space, {n: p - pose.scale * pose.turn @ moved(n) for n, p in clear.items()}) if clear else None
+    return Told.of(space, {n: p - pose.scale * pose.turn @ moved(n) for n, p in marks.items()}) if marks else None

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from ..adapt.closest import Surface
+from ..adapt.thin_plate_spline import similarity
 from ..anatomy.head import Head
 from ..scan.individual import displaced, functionals, read_table, smoothest
 from .expression import line_of
@@ -33,11 +34,21 @@ def infant_space(reference: Head, space: ShapeSpace) -> ShapeSpace:
     return replace(space, points=infant_points(reference, space.points), size=_size(_shares(read_table(TABLE))))
 
 
-def likelier_space(reference: Head, space: ShapeSpace, size: float) -> ShapeSpace:
-    """``space``, the shape space of the ``reference``, or `infant_space`, whichever has likelier heads that are ``size`` times
-    the reference."""
+def likelier_space(reference: Head, space: ShapeSpace, size: float, marks: dict[str, np.ndarray]) -> ShapeSpace:
+    """``space``, the shape space of the ``reference``, or `infant_space`, if heads that are ``size`` times the reference are
+    likelier there and ``marks``, name -> (3,) mm, lie more as on those, which of a small cast of a grown head they do not."""
     infants = infant_space(reference, space)
-    return infants if abs(np.log(size / infants.size)) < abs(np.log(size / space.size)) else space
+    if abs(np.log(size / infants.size)) > abs(np.log(size / space.size)):
+        return space
+    return min((space, infants), key=lambda each: _amiss(each, marks))
+
+
+def _amiss(space, marks):
+    """mm, of a head of the reference's size, by which ``marks`` lie amiss on the likeliest of the ``space``, all of them."""
+    laid = space.landmarks(space.points)
+    own, places = (np.array([of[name] for name in marks if name in laid]) for of in (laid, marks))
+    matrix, shift = similarity(own, places)
+    return np.linalg.norm(own @ matrix.T + shift - places) / np.cbrt(np.linalg.det(matrix))
 
 
 def infant_points(reference: Head, points: np.ndarray) -> np.ndarray:
