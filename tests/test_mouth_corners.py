@@ -90,7 +90,7 @@ def test_lips_are_ajar_when_a_little_apart_and_what_is_wide_is_left_to_the_outli
 
 
 @pytest.mark.parametrize(
-    ("fits", "teeth", "rolled", "wide", "ajar"),
+    ("fits", "teeth", "no_hole", "wide", "ajar"),
     [
         (1.0, False, False, False, True),
         (1.0, True, False, True, True),
@@ -102,8 +102,8 @@ def test_lips_are_ajar_when_a_little_apart_and_what_is_wide_is_left_to_the_outli
         (1.2, False, True, True, False),
     ],
 )
-def test_lips_are_far_apart_only_where_they_roll_in_teeth_show_or_closed_ones_fit_plainly_worse(
-    fits, teeth, rolled, wide, ajar, monkeypatch
+def test_lips_are_far_apart_only_around_no_hole_where_teeth_show_or_where_closed_ones_fit_plainly_worse(
+    fits, teeth, no_hole, wide, ajar, monkeypatch
 ):
     """A scan from above has a hole between closed lips too, where the upper one hides the edge of the lower one."""
     closed, free = SimpleNamespace(coefficients=0, pose=None), SimpleNamespace(coefficients=1, pose=None)
@@ -122,7 +122,7 @@ def test_lips_are_far_apart_only_where_they_roll_in_teeth_show_or_closed_ones_fi
         "teeth_seen": lambda *_: teeth,
     }.items():
         monkeypatch.setattr(expression, name, answer)
-    for outline, parted in ((SimpleNamespace(rolled=rolled), wide), (None, ajar)):
+    for outline, parted in ((SimpleNamespace(no_hole=no_hole), wide), (None, ajar)):
         monkeypatch.setattr(expression, "outline_of", lambda *_, seen=outline: seen)
         assert finish(expression._fit_lips(SimpleNamespace(parted=1), None, closed))[1] == parted
 
@@ -144,7 +144,47 @@ def test_teeth_between_lips_are_seen(teeth, behind):
 @pytest.mark.parametrize(("upper", "lower"), [(0, 0), (3, 0), (0, 3), (1.5, 1.5), (5, 1.5)])
 def test_lips_of_an_open_mouth_roll_in_and_edges_of_a_hole_do_not(upper, lower, noise):
     found = mouth_outline(_face(rolled=(upper, lower), noise=noise), _guess(), FORWARD)
-    assert found.rolled is (min(upper, lower) > 0)
+    assert found.no_hole is (min(upper, lower) > 0)
+
+
+def _behind(face, lip, deep=2.4):
+    """``face`` with the edge of the ``upper`` or the ``lower`` lip, or of ``both``, going on straight back, out of sight."""
+    rim = np.flatnonzero(face.gap_vertex | face.border_vertex)
+    x, y, z = face.vertices[rim].T
+    inner = (np.abs(x) < HALF + 1) & (np.abs(z) < OPEN / 2 + 5)
+    above = z > RISE * (x / HALF) ** 2
+    rim = rim[inner & {"upper": above, "lower": ~above, "both": inner}[lip]]
+    place = np.full(len(face.vertices), -1)
+    place[rim] = len(face.vertices) + np.arange(len(rim))
+    sides = np.concatenate([face.triangles[:, [k, (k + 1) % 3]] for k in range(3)])
+    known = {tuple(side) for side in sides.tolist()}
+    open_ = np.array([(a, b) for a, b in sides[(place[sides] >= 0).all(axis=1)].tolist() if (b, a) not in known])
+    a, b = open_.T
+    more = np.concatenate([np.stack([b, a, place[a]], 1), np.stack([b, place[a], place[b]], 1)])
+    back = face.vertices[rim] + [0.0, deep, 0.0]
+    return Surface(np.concatenate([face.vertices, back]), np.concatenate([face.triangles, more]))
+
+
+@pytest.mark.parametrize(("lip", "no_hole"), [("both", True), ("upper", False), ("lower", False)])
+def test_a_gap_is_no_hole_where_the_scan_goes_on_behind_both_lips(lip, no_hole):
+    """An infant's lower lip is foremost at its edge, seen from before: nothing of it rolls in."""
+    found = mouth_outline(_behind(_face(), lip, deep=6.0), _guess(), FORWARD)
+    assert found.no_hole is no_hole
+
+
+@pytest.mark.parametrize("back", [20.0, 35.0, 60.0])
+def test_a_lower_lip_is_found_as_far_back_as_a_jaw_takes_it(back):
+    """Of a mouth that is open in full it lies 30 mm behind the upper one."""
+    face = _face(wide=30.0)
+    low = np.array([0.0, back, 0.0]) * (face.vertices[:, 2:] < RISE * (face.vertices[:, :1] / HALF) ** 2)
+    share = np.clip(1 - np.abs(face.vertices[:, :1]) / HALF, 0, 1) ** 0.5  # at the corners the lips meet
+    guess = _guess() | {"ls": np.array([0.0, 0, 20])}
+    found = mouth_outline(Surface(face.vertices + low * share, face.triangles), guess, FORWARD)
+    assert (found is not None) == (back < 50)
+    if found is not None:
+        assert found.lower == pytest.approx([0, back, -15], abs=2.0)
+        for name, side in (("ch_l", 1), ("ch_r", -1)):
+            assert found.corners[name][[0, 2]] == pytest.approx([side * HALF, RISE], abs=4.0)
 
 
 def test_how_far_lips_roll_in_is_measured_at_either():

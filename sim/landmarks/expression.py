@@ -36,7 +36,7 @@ WIDE, ALONE = -0.2, 0.1
 APART = 4.0
 FAR_APART = 12.0  # mm: what is ajar is less
 #: How far from the scan lips that are parted may lie, against closed ones: two fits differ as much by chance. Where a gap is
-#: seen they are parted, whatever fits, if its edges roll in, or the edge of the upper teeth is seen in it: parted lips fitted
+#: seen they are parted, whatever fits, if it is no hole, or the edge of the upper teeth is seen in it: parted lips fitted
 #: .54 to 1.06 of closed ones on 32 scans of open mouths, and .79 to 1.34 on 12 of closed ones with a hole there. Without either
 #: they are parted only if they fit better than around any hole.
 NO_WORSE, BETTER = 1.05, 0.75
@@ -58,7 +58,7 @@ def _fit_lips(space, target, fit):
     if told is not None:
         work = fit_shape(space, target, free.pose, CHANGE, free.coefficients, 1, Expression(True), told)
         free = yield from part_of(work, 1, 3)
-    parted = told is not None and (outline.rolled or teeth_seen(space, free, target))
+    parted = told is not None and (outline.no_hole or teeth_seen(space, free, target))
     if not parted and (told is not None or lips_ajar(space, free, target)):
         mouth, least = about_mouth(space), NO_WORSE if told is None else BETTER
         parted = cost(space, free, mouth) < least * cost(space, fit, mouth)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..adapt.closest import Surface
-from ..relax.mouth_gap import SPECK, STEP, bridged_depths
+from ..relax.mouth_gap import DEEP, SPECK, STEP, bridged_depths
 from ..relax.parted import APART
 from ..relax.smile import CORNERS
 
@@ -22,22 +22,27 @@ DRIFT = 1.5  # mm that an edge of the gap may rise or fall from one column to th
 BESIDE = 2.0  # mm above and below the gap within which the lips are looked for
 NARROW = 25.0  # mm between corners below which it is no mouth
 NEAR = 6.0  # mm from where the gap ends to the scan
+FARTHEST = 2 * DEEP  # mm looked behind the upper lip: the lower one of a mouth open in full lies beyond 25
 LOWER = 30.0  # mm: how much farther down is looked where a gap goes on below the chin that was expected
 #: Lips roll in: where a mouth is open their edges turn back into it, by .8 mm and more in 32 scans, on both lips; around holes
 #: that scanners left on a closed one, by .1 at most in 12, on one of them. mm aside of the middle that are looked over, mm
 #: beside an edge within which a lip is foremost, mm within that it is followed inward, over steps up to that, mm of roll.
 ROLLED_OVER, FOREMOST, INWARD, FOLLOWED, ROLL = 8.0, 5.0, 3.0, 3.5, 0.45
+#: Where the scan ends at an edge there is a hole. mm from the edge to the scan; share of its places beside open sides above
+#: which the scan ends there: 0 on six open mouths, .88 and more on the lower lip of seven closed ones with a hole.
+ENDS, ENDED = 2.0, 0.25
 
 
 @dataclass(frozen=True, eq=False)
 class MouthOutline:
-    """corners : ``ch_l`` and ``ch_r`` -> (3,) mm; upper, lower (3,) mm : where the lips end in the middle; rolled : whether
-    the lips roll in there, as they do not around a hole that a scanner left on closed ones."""
+    """corners : ``ch_l`` and ``ch_r`` -> (3,) mm; upper, lower (3,) mm : where the lips end in the middle; no_hole : whether
+    what parts them is no hole that a scanner left on closed lips: they roll in there, or the scan goes on out of sight behind
+    both of them."""
 
     corners: dict[str, np.ndarray]
     upper: np.ndarray
     lower: np.ndarray
-    rolled: bool
+    no_hole: bool
 
     @property
     def marks(self) -> dict[str, np.ndarray]:
@@ -68,8 +73,8 @@ def mouth_outline(target: Surface, marks, forward, scale: float = 1.0) -> MouthO
     found = target.closest(np.array(corners), NEAR * scale)
     if not found.found.all() or np.linalg.norm(np.subtract(*found.points)) < NARROW * scale:
         return None
-    rolled = bool(min(lip_rolls(depth, column)) > ROLL)
-    return MouthOutline(dict(zip(CORNERS, found.points, strict=True)), upper, lower, rolled)
+    no_hole = min(lip_rolls(depth, column)) > ROLL or scan_goes_on(target, places, scale * depth, forward, column)
+    return MouthOutline(dict(zip(CORNERS, found.points, strict=True)), upper, lower, bool(no_hole))
 
 
 def looked_at(target: Surface, marks, forward, scale: float, lower: float = 0.0):
@@ -79,7 +84,7 @@ def looked_at(target: Surface, marks, forward, scale: float, lower: float = 0.0)
     arch, up = mouth_arch(marks, "ls", forward, aside)
     above = np.arange(scale * ABOVE, (marks["pg"] - marks["ls"]) @ up - scale * lower, -scale * DOWN)
     places = arch[:, None] + above[:, None] * up
-    depth = bridged_depths(target, places.reshape(-1, 3), forward).reshape(places.shape[:2])
+    depth = bridged_depths(target, places.reshape(-1, 3), forward, scale * FARTHEST).reshape(places.shape[:2])
     return places, depth / scale
 
 
@@ -120,15 +125,41 @@ def lip_rolls(depth, column: int) -> tuple[float, float]:
 
     depth (c, r) mm, see `looked_at`
     """
-    top, aside = int(ABOVE / DOWN), int(ROLLED_OVER / ASIDE)
-    rolls = []
-    for line in depth[max(column - aside, 0) : column + aside + 1]:
-        lips = widest_gap(line[top:])
-        if lips is not None:
-            upper, lower = top + lips[0], top + lips[1]
-            rolls.append((_roll(line[: upper + 1], line[upper:]), _roll(line[: lower - 1 : -1], line[lower::-1])))
+    rolls = [
+        (_roll(depth[c, : upper + 1], depth[c, upper:]), _roll(depth[c, : lower - 1 : -1], depth[c, lower::-1]))
+        for c, upper, lower in gaps_about(depth, column)
+    ]
     upper, lower = np.median(rolls, axis=0) if rolls else (0.0, 0.0)
     return float(upper), float(lower)
+
+
+def scan_goes_on(target: Surface, places, depth, forward, column: int) -> bool:
+    """Whether the scan does not end at the edges of either lip about a ``column``, but turns out of sight there.
+
+    places (c, r, 3) mm and depth (c, r) mm on the scan, see `looked_at`
+    """
+    gaps = np.array(gaps_about(depth, column))
+    if len(gaps) == 0:
+        return False
+    for lip in (1, 2):
+        at = gaps[:, 0], gaps[:, lip]
+        if target.closest(places[at] - depth[at][:, None] * forward, ENDS).border.mean() > ENDED:
+            return False
+    return True
+
+
+def gaps_about(depth, column: int) -> list[tuple[int, int, int]]:
+    """Columns near to a ``column`` in which there is a gap, with the last place of the upper lip and the first of the lower.
+
+    depth (c, r) mm, see `looked_at`
+    """
+    top, aside = int(ABOVE / DOWN), int(ROLLED_OVER / ASIDE)
+    found = []
+    for c in range(max(column - aside, 0), min(column + aside + 1, len(depth))):
+        lips = widest_gap(depth[c, top:])
+        if lips is not None:
+            found.append((c, top + lips[0], top + lips[1]))
+    return found
 
 
 def _roll(lip, inward) -> float:
@@ -142,8 +173,9 @@ def _roll(lip, inward) -> float:
 
 
 def goes_on_below(depth) -> bool:
-    """Whether what the scan lacks in the middle of the mouth goes on below what was looked at, ``depth`` (c, r) mm."""
-    return bool(np.isnan(depth[len(depth) // 2 + (MIDDLE / ASIDE).astype(int), -1]).all())
+    """Whether what the scan lacks in the middle of the mouth goes on below what was looked at, ``depth`` (c, r) mm. A neck that
+    is seen there, through the mouth or under the chin, is no lip."""
+    return not (depth[len(depth) // 2 + (MIDDLE / ASIDE).astype(int), -1] < DEEP).any()
 
 
 def widest_gap(line):

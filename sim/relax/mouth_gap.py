@@ -106,10 +106,10 @@ def depths(target: Surface, points, forward, deep: float = DEEP) -> np.ndarray:
     return out
 
 
-def bridged_depths(target: Surface, points, forward) -> np.ndarray:
+def bridged_depths(target: Surface, points, forward, deep: float = DEEP) -> np.ndarray:
     """(k,) as `depths`, but where the scan lacks single triangles, and so nothing or the inside of the mouth is seen, it is as
     deep as beside them."""
-    out = depths(target, points, forward)
+    out = depths(target, points, forward, deep)
     there = np.isfinite(out)
     if not target.gap_vertex.any() or not there.any():
         return out
