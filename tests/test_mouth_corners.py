@@ -194,9 +194,15 @@ def test_how_far_lips_roll_in_is_measured_at_either():
     assert lip_rolls(looked_at(_face(gap=False), _guess(), FORWARD, 1.0)[1], len(column) // 2) == (0.0, 0.0)
 
 
-def test_a_mouth_is_found_that_is_open_to_below_where_the_chin_was_expected():
-    """A jaw that opened far takes the chin down with it, and a first guess may not."""
+@pytest.mark.parametrize("neck", [False, True])
+def test_a_mouth_is_found_that_is_open_to_below_where_the_chin_was_expected(neck):
+    """A jaw that opened far takes the chin down with it, and a first guess may not; nor is a neck seen through it a lip."""
     face, high = _face(wide=30.0), _guess() | {"ls": np.array([0.0, 0, 20]), "pg": np.array([0.0, 0, -8])}
+    if neck:
+        whole = _face(gap=False)
+        more = whole.triangles + len(face.vertices)
+        back = whole.vertices + [0.0, 40.0, 0.0]
+        face = Surface(np.concatenate([face.vertices, back]), np.concatenate([face.triangles, more]))
     found = mouth_outline(face, high, FORWARD)
     assert found.lower[2] == pytest.approx(-15, abs=1.5) and found.upper[2] == pytest.approx(15, abs=1.5)
 

@@ -29,7 +29,7 @@ LOWER = 30.0  # mm: how much farther down is looked where a gap goes on below th
 #: beside an edge within which a lip is foremost, mm within that it is followed inward, over steps up to that, mm of roll.
 ROLLED_OVER, FOREMOST, INWARD, FOLLOWED, ROLL = 8.0, 5.0, 3.0, 3.5, 0.45
 #: Where the scan ends at an edge there is a hole. mm from the edge to the scan; share of its places beside open sides above
-#: which the scan ends there: 0 on six open mouths, .88 and more on the lower lip of seven closed ones with a hole.
+#: which the scan ends there: 0 on eleven open mouths, .88 and more on the lower lip of seven closed ones with a hole.
 ENDS, ENDED = 2.0, 0.25
 
 
