@@ -10,8 +10,8 @@ from headshop.sim.adapt.closest import Surface
 from headshop.sim.adapt.landmarks import read_landmarks
 from headshop.sim.anatomy.landmark_names import SKIN, mirrored
 from headshop.sim.errors import InputError
-from headshop.sim.landmarks import placed_face, verdict
-from headshop.sim.landmarks.find import find_landmarks
+from headshop.sim.landmarks import find, placed_face, verdict
+from headshop.sim.landmarks.find import better_of, find_landmarks
 from headshop.sim.landmarks.pose_search import Pose
 from headshop.sim.landmarks.shape_fit import ShapeFit, fit_shape
 from headshop.sim.landmarks.shape_space import shape_space
@@ -321,3 +321,36 @@ def test_a_thorough_look_begins_with_the_places_most_like_a_face(reference, monk
         work = placed_face._trials(look, reference, space, reference.skin, samples, samples, 1.0)
         trials = sorted(finish(work), key=lambda t: t[0])
         assert [size(look, pose) for _, _, pose, _ in trials] == order
+
+
+@pytest.mark.parametrize(
+    ("name", "off", "parted", "scale", "by_map"),
+    [
+        ("pg", 4.0, True, 1.0, True),
+        ("pg", 6.0, True, 1.0, False),
+        ("cph_r", 6.0, True, 1.0, False),
+        ("pg", 6.0, False, 1.0, True),
+        ("pg", 4.0, True, 0.7, False),
+        ("pg", 6.0, True, 1.3, True),
+        ("prn", 6.0, True, 1.0, True),
+        ("g", 4.0, False, 1.0, False),
+    ],
+)
+def test_of_parted_lips_and_their_chin_the_range_map_is_trusted_near_the_shape(name, off, parted, scale, by_map):
+    shape, other = {name: np.array([1.0, 2, 3])}, {name: np.array([1.0, 2, 3 - off])}
+    assert better_of(shape, other, parted, scale)[name] is (other if by_map else shape)[name]
+
+
+@pytest.mark.parametrize(("scan", "carried"), [("s1_smile_scan", False), ("s1_scan", True)])
+def test_a_chin_that_the_range_map_has_far_off_stays_under_parted_lips(reference, shared, monkeypatch, scan, carried):
+    shape = {}
+
+    def weighed(seen, positions, *_):
+        yield Progress(1.0, "")
+        shape.update(positions)
+        return positions | {"pg": positions["pg"] + 12.0}
+
+    monkeypatch.setattr(find, "weighed", weighed)
+    mesh, _ = clean_scan(read_ply(shared / "ict" / "examples" / f"{scan}.ply"))
+    found = finish(find_landmarks(mesh, reference)).positions["pg"]
+    assert found == pytest.approx(shape["pg"] + (12.0 if carried else 0.0), abs=1e-9)
