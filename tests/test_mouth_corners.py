@@ -147,10 +147,10 @@ def test_lips_of_an_open_mouth_roll_in_and_edges_of_a_hole_do_not(upper, lower, 
     assert found.no_hole is (min(upper, lower) > 0)
 
 
-def _behind(face, lip, deep=2.4):
+def _behind(face, lip):
     """``face`` with the edge of the ``upper`` or the ``lower`` lip, or of ``both``, going on straight back, out of sight."""
     rim = np.flatnonzero(face.gap_vertex | face.border_vertex)
-    x, y, z = face.vertices[rim].T
+    x, _, z = face.vertices[rim].T
     inner = (np.abs(x) < HALF + 1) & (np.abs(z) < OPEN / 2 + 5)
     above = z > RISE * (x / HALF) ** 2
     rim = rim[inner & {"upper": above, "lower": ~above, "both": inner}[lip]]
@@ -161,14 +161,14 @@ def _behind(face, lip, deep=2.4):
     open_ = np.array([(a, b) for a, b in sides[(place[sides] >= 0).all(axis=1)].tolist() if (b, a) not in known])
     a, b = open_.T
     more = np.concatenate([np.stack([b, a, place[a]], 1), np.stack([b, place[a], place[b]], 1)])
-    back = face.vertices[rim] + [0.0, deep, 0.0]
+    back = face.vertices[rim] + [0.0, 6.0, 0.0]
     return Surface(np.concatenate([face.vertices, back]), np.concatenate([face.triangles, more]))
 
 
 @pytest.mark.parametrize(("lip", "no_hole"), [("both", True), ("upper", False), ("lower", False)])
 def test_a_gap_is_no_hole_where_the_scan_goes_on_behind_both_lips(lip, no_hole):
     """An infant's lower lip is foremost at its edge, seen from before: nothing of it rolls in."""
-    found = mouth_outline(_behind(_face(), lip, deep=6.0), _guess(), FORWARD)
+    found = mouth_outline(_behind(_face(), lip), _guess(), FORWARD)
     assert found.no_hole is no_hole
 
 
