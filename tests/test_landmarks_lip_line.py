@@ -9,7 +9,7 @@ import pytest
 from headshop.sim.adapt.closest import Surface
 from headshop.sim.landmarks.expression import told_of_lips
 from headshop.sim.landmarks.find import find_landmarks
-from headshop.sim.landmarks.lip_line import PLAIN, LipLine, line_ends, lip_line
+from headshop.sim.landmarks.lip_line import PLAIN, LipLine, line_ends, lip_line, missing_run
 from headshop.sim.landmarks.picked import moved
 from headshop.sim.landmarks.pose_search import Pose
 from headshop.sim.landmarks.shape_fit import CHANGE, fit_shape
@@ -22,9 +22,10 @@ HALF, RISE = 22.0, 3.0  # mm: half the mouth's width, how far its corners are ra
 FORWARD = np.array([0.0, -1.0, 0.0])
 
 
-def _face(deep=2.0, slit=False, noise=0.0, speck=False, hole=False):
+def _face(deep=2.0, slit=False, noise=0.0, speck=False, hole=False, ends=(-40.0, -40.0)):
     """A rounded surface with a crease in it like that between closed lips, ``deep`` mm, or a ``slit`` without data; with
-    ``noise`` mm, a ``speck`` without data 12 mm beyond the left corner, and a ``hole`` about the right one."""
+    ``noise`` mm, a ``speck`` without data 12 mm beyond the left corner, and a ``hole`` about the right one; it ends so many mm
+    below the line's middle about that corner, and elsewhere."""
     x, z = np.meshgrid(np.arange(-60, 60.1, 0.5), np.arange(-40, 40.1, 0.5))
     high = z - RISE * (x / HALF) ** 2
     along = np.clip((HALF - np.abs(x)) / 3, 0, 1)
@@ -41,6 +42,7 @@ def _face(deep=2.0, slit=False, noise=0.0, speck=False, hole=False):
     gone = slit & (np.abs(up - RISE * (across / HALF) ** 2) < 0.8) & (np.abs(across) < HALF)
     gone |= speck & (np.hypot(across - HALF - 12, up - RISE * ((HALF + 12) / HALF) ** 2) < 1.5)
     gone |= hole & (np.hypot(across + HALF, up - RISE) < 12)
+    gone |= up < np.where(across < -15, *ends)
     return Surface(points, triangles[~gone])
 
 
@@ -77,6 +79,27 @@ def test_a_corner_in_a_hole_is_not_told():
     found = lip_line(_face(slit=True, hole=True), _guess(4.0), FORWARD)
     assert set(found.corners) == {"ch_l"}
     assert found.corners["ch_l"] == pytest.approx([HALF, HALF**2 / 40, RISE], abs=2.0)
+
+
+@pytest.mark.parametrize("end", [-4.0, -6.0])
+def test_no_line_goes_on_along_the_end_of_a_scan(end):
+    found = lip_line(_face(ends=(end, end)), _guess(4.0), FORWARD)
+    assert found.middle[[0, 2]] == pytest.approx([0, 0], abs=1.0)
+    for name, side in (("ch_l", 1), ("ch_r", -1)):
+        assert found.corners[name] == pytest.approx([side * HALF, HALF**2 / 40, RISE], abs=2.0)
+
+
+@pytest.mark.parametrize(("near", "told"), [(2.4, {"ch_l"}), (4.5, {"ch_l", "ch_r"})])
+def test_a_corner_at_the_end_of_a_scan_is_not_told(near, told):
+    found = lip_line(_face(ends=(RISE - near, -40.0)), _guess(4.0), FORWARD)
+    assert set(found.corners) == told
+
+
+def test_what_is_missing_to_the_end_of_a_column_may_go_on_beyond():
+    depth = np.array([[1.0, np.nan, np.nan, 2.0, np.nan], [np.nan, 1.0, 1.0, np.nan, 1.0]])
+    missing = missing_run(depth)
+    assert missing[0, :4].tolist() == [0, 2, 2, 0] and missing[1, 1:].tolist() == [0, 0, 1, 0]
+    assert missing[0, 4] >= 5 and missing[1, 0] >= 5
 
 
 def test_what_of_the_mouth_shows_through_the_slit_is_not_where_lips_meet():

@@ -20,6 +20,7 @@ LOST = 11.0  # mm: a landmark less certain than that is missing
 UNSURE = 8.0  # mm of doubt that halve the confidence
 NEAR_EAR = 8.0  # mm from an ear to what the scan has there
 LIES = 2.5  # mm from the scan within which skin lies on it
+TINY = 1e-9  # mm²: skin that does not count has no area
 #: Likeness of a scan to an ear from which on it shows one, see `like_ears`: .47 of ears under hair, from .69 of 22 others.
 LIKE_AN_EAR = 0.58
 SLIT = 0.5  # opening of lids against the reference's below which open eyes were not read well
@@ -42,7 +43,7 @@ def support(space: ShapeSpace, fit: ShapeFit) -> dict[str, float]:
     near = tree.query_ball_point(np.array(list(places.values())), AROUND * fit.pose.scale)
     area = space.area
     return {
-        name: float((area[i] * on[i]).sum() / area[i].sum()) if len(i) else 0.0
+        name: float((area[i] * on[i]).sum() / max(area[i].sum(), TINY)) if len(i) else 0.0
         for name, i in zip(places, near, strict=True)
     }
 

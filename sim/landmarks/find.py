@@ -20,13 +20,15 @@ from .pose_search import LOOKING
 from .shape_space import shape_space
 from .sure import SURE
 from .under_hair import SKULL, fit_under_hair, hair_over, in_face
+from .unseen_jaw import with_unseen_jaw
 from .verdict import misfit_of
 
 #: Landmarks that the shape tells better than the range map.
 OWN = set("v op eu g n se ps pi ex ft ac sbal li ch sa sba pa obs".split())
 #: Of lips and chin the range map looks where closed lips have them, and parted ones mislead it: where it had these farther than
-#: that from the shape, mm on a head of the reference's size, the shape was the nearer one in 13 of 15 cases on 29 scans.
-ABOUT_LIPS, ASTRAY = set("ls cph sl pg gn".split()), 5.0
+#: that from the shape, mm on a head of the reference's size, the shape was the nearer one in 13 of 15 cases on 29 scans. So do
+#: lips at which the scan ends.
+ABOUT_LIPS, ASTRAY = set("ls cph sto sl pg gn".split()), 5.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,8 +80,10 @@ def find_landmarks(mesh: Mesh, reference: Head | None = None, unit_scales=(1.0,)
     yield Progress(0.05, LOOKING)
     scale, fit, target, space = yield from portion(place_face(mesh, reference, space, unit_scales), 0.05, 0.75)
     fit = yield from portion(with_likelier_ears(space, target, fit), 0.75, 0.8)
+    whole = space
+    fit, space = yield from run(with_unseen_jaw(space, target, fit), 0.8, 0.81, "Looking for the mouth")
     if space.of_infants:
-        fit = yield from run(with_mouth_in_place(space, target, fit), 0.8, 0.82, "Looking for the mouth")
+        fit = yield from run(with_mouth_in_place(space, target, fit), 0.81, 0.82, "Looking for the mouth")
     misfit = misfit_of(space, fit)
     fit, shown = yield from run(fit_expression(space, target, fit), 0.82, 0.88, "Looking at lips and lids")
     hair = yield from run(fit_under_hair(space, target, fit, shown), 0.88, 0.9, "Looking for hair")
@@ -93,7 +97,7 @@ def find_landmarks(mesh: Mesh, reference: Head | None = None, unit_scales=(1.0,)
     bare = target.without(hair_over(space, fit, target, hair.covered & ~in_face(space, fit, {}, 0.0)))
     seen = Mesh.from_triangles(bare.vertices, bare.triangles)
     other = yield from portion(weighed(seen, positions, confidence, reference, bare), 0.9, 1.0)
-    positions = better_of(positions, other, shown.parted, fit.pose.scale)
+    positions = better_of(positions, other, shown.parted or space is not whole, fit.pose.scale)
     lids = meeting_lids(space, fit, target, shown.shut) | shown.lids
     lids = {n: p for n, p in lids.items() if n in positions}
     positions |= lids
@@ -108,14 +112,14 @@ def find_landmarks(mesh: Mesh, reference: Head | None = None, unit_scales=(1.0,)
     return FoundLandmarks(positions, confidence, mid_air, missing, scale, misfit)
 
 
-def better_of(shape, by_map, parted: bool, scale: float) -> dict[str, np.ndarray]:
+def better_of(shape, by_map, misled: bool, scale: float) -> dict[str, np.ndarray]:
     """Name -> (3,) mm: each landmark where the ``shape`` has it or where the range map does, ``by_map``, both such tables.
 
-    parted : whether the lips are; scale : mm on the scan per mm of the reference
+    misled : whether the lips are parted, or the scan ends at them; scale : mm on the scan per mm of the reference
     """
     out = {}
     for name, place in shape.items():
         base = name.partition("_")[0]
-        astray = parted and base in ABOUT_LIPS and np.linalg.norm(by_map[name] - place) > ASTRAY * scale
+        astray = misled and base in ABOUT_LIPS and np.linalg.norm(by_map[name] - place) > ASTRAY * scale
         out[name] = place if astray or base in OWN else by_map[name]
     return out

@@ -29,6 +29,7 @@ from .pose_search import Pose
 from .shape_fit import NoFaceError, Told, fit_shape
 from .shape_space import shape_space
 from .under_hair import EAR, SKULL, fit_under_hair, hair_over, in_face
+from .unseen_jaw import JAW, unseen_jaw, with_unseen_jaw
 
 LOOKING = "Looking at lids and lips"
 #: Landmarks about which skin is much the same, so that a plausible head does not tell where they are.
@@ -89,8 +90,10 @@ def first_look(
     coarse = target.coarser()
     try:
         fit = yield from run(fit_shape(space, coarse, pose, told=told), 0.0, 0.55, LOOKING)
+        if not any(name in given for name in JAW):
+            fit, space = yield from run(with_unseen_jaw(space, coarse, fit), 0.55, 0.58, LOOKING)
         if space.of_infants:
-            fit = yield from run(with_mouth_in_place(space, coarse, fit), 0.55, 0.6, LOOKING)
+            fit = yield from run(with_mouth_in_place(space, coarse, fit), 0.58, 0.6, LOOKING)
         fit, shown = yield from run(fit_expression(space, coarse, fit), 0.6, 0.9, LOOKING)
         skull = [n for n in names if n.partition("_")[0] in SKULL and n not in found]
         off = in_mid_air(target, np.reshape([given[n] for n in skull], (-1, 3)))
@@ -116,6 +119,8 @@ def first_look(
     shows = hair_over(space, hair.fit, target, covered)
     left = target.without(held | shows)
     hidden = hidden_skin(space, fit, target.vertices[target.triangles[held].ravel()], left)
+    if not any(name in given for name in JAW):
+        hidden |= unseen_jaw(space, fit, left)
     filled = with_hidden_skin(space, fit, hidden, left)
     no_ear = space.ear < EAR  # ears take the reference's shape
     filled = with_hidden_skin(space, hair.fit, covered & no_ear, filled)

@@ -8,7 +8,7 @@ as the line of shut lids is (`sim.adapt.lid_line`), and ends where what it is de
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
+from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from ..adapt.closest import Surface
 from ..adapt.lid_line import best_way, crease
@@ -31,6 +31,7 @@ AROUND = 4  # columns beside a corner that tell how deep it lies, and must not l
 #: scans of 42 that show where closed ones meet they did from 4 mm before to 6 mm behind; what showed through lay 14 behind.
 WITHIN = 9.0
 SLIT = 4.0  # mm from above to below of what a scanner loses between lips; what is wider is a hole, and tells nothing
+END = 3.0  # mm above and below the line within which a scan that ends leaves open how deep it is
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,17 +77,20 @@ def lip_height(target: Surface, marks, forward, scale: float = 1.0) -> np.ndarra
 
 def _followed(target, marks, forward, scale, far):
     """The line worth most up to ``far`` above and below the middle: mm aside (c,) of the middle; what each place of it is worth
-    and how deep it lies, mm (c,); the places (c, 3) mm in front of it; whether the scan has a hole there (c,)."""
+    and how deep it lies, mm (c,); the places (c, 3) mm in front of it; whether the scan has a hole there, or ends near it (c,).
+    """
     aside = np.arange(-WIDE, WIDE + ASIDE / 2, ASIDE)
     heights = np.arange(far, -far - STEP / 2, -STEP)
     arch, up = mouth_arch(marks, "sto", forward, scale * aside)
     places = arch[:, None] + scale * heights[:, None] * up
     depth = depths(target, places.reshape(-1, 3), forward).reshape(places.shape[:2]) / scale
     depth[depth > WITHIN] = np.nan
-    hole = missing_run(depth) > SLIT / STEP
+    missing = missing_run(depth)
+    hole = missing > SLIT / STEP
     worth = uniform_filter1d(np.where(hole, 0.0, crease(depth, int(BESIDE / STEP))), ALONG, axis=0)
     way = best_way(worth - STRAY * (heights / far) ** 2)
     columns = np.arange(len(aside))
+    hole |= maximum_filter1d(missing, 2 * int(END / STEP) + 1, axis=1) >= depth.shape[1]
     return aside, *(grid[columns, way] for grid in (worth, depth, places, hole))
 
 
@@ -97,10 +101,11 @@ def _middle(depth, places, forward, scale):
 
 
 def missing_run(depth) -> np.ndarray:
-    """(c, r) how many places in a row are missing around each of the columns ``depth`` (c, r); 0 where it is known."""
-    known, row = np.isfinite(depth), np.arange(depth.shape[1])
-    before = np.maximum.accumulate(np.where(known, row, -1), axis=1)
-    after = np.minimum.accumulate(np.where(known, row, len(row))[:, ::-1], axis=1)[:, ::-1]
+    """(c, r) how many places in a row are missing around each of the columns ``depth`` (c, r); 0 where it is known. Where
+    nothing is known to the end of a column they are as many as it has, or more: nobody knows how far they go on."""
+    known, row, many = np.isfinite(depth), np.arange(depth.shape[1]), depth.shape[1]
+    before = np.maximum.accumulate(np.where(known, row, -many - 1), axis=1)
+    after = np.minimum.accumulate(np.where(known, row, 2 * many)[:, ::-1], axis=1)[:, ::-1]
     return np.where(known, 0, after - before - 1)
 
 

@@ -200,12 +200,20 @@ def with_likelier_ears(space: ShapeSpace, target: Surface, fit: ShapeFit) -> Wor
     before = like_ears(space, fit, target)
     if min(before.values()) >= LIKELY_EARS:
         return fit
-    try:
-        again = yield from run(fit_shape(space, target, _lies(space, fit)), 0.0, 1.0, FITTING)
-    except NoFaceError:
+    again = yield from run(begun_again(space, target, fit), 0.0, 1.0, FITTING)
+    if again is None:
         return fit
     gain = sum(like_ears(space, again, target).values()) - sum(before.values())
     return again if gain > LIKELIER else fit
+
+
+def begun_again(space: ShapeSpace, target: Surface, fit: ShapeFit, size: float | None = None):
+    """A generator: yields the fraction done, returns a `ShapeFit` begun from where the whole of ``fit`` lies; None: it finds
+    no face. ``size`` : as in `fit_shape`."""
+    try:
+        return (yield from fit_shape(space, target, _lies(space, fit), size=size))
+    except NoFaceError:
+        return None
 
 
 def _or_infant(reference, result) -> Work:
