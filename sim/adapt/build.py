@@ -17,7 +17,7 @@ from ..progress import Progress, Work, portion
 from ..relax.choice import kept_open, neutral_of, require_choice, smiles_closed
 from .bone import depth_under
 from .closest import Surface
-from .fit_sentence import SMILES_CLOSED, fit_sentence, fitted_shares, invented
+from .fit_sentence import MOST, SMILES_CLOSED, fit_sentence, fitted_shares, invented
 from .follow import follow
 from .gate import check_against_scan, check_arrangement, check_likeness, check_on_surface
 from .landmarks import require_usable
@@ -111,14 +111,16 @@ def build_head(
     head = followed.head
     scanned = head.skin.vertices + (fit.cage - skin)
     report = fit_report(reference, fit, given, scanned)
-    report["invented"] = invented(fitted_shares(head, fit.fitted.fitted))
+    shares = fitted_shares(head, fit.fitted.fitted)
+    report["invented"] = invented(shares)
     jumps, ends = (float(before.area.sum() - after.area.sum()) for before, after in ((whole, smooth), (smooth, target)))
     report["left_out_mm2"] = {"depth_jumps": jumps, "flat_ends": ends} | look.left_out
     report["sentence"] = fit_sentence(report, report["invented"])
     if neutral is not None and relax == "never":
         head, neutral = kept_open(fit.lips_closed, head, scanned, neutral.jaw), None
     report["relaxed"] = None if neutral is None else neutral.report
-    report["advice"] = SMILES_CLOSED if relax == "auto" and neutral is None and smiles_closed(fit) else None
+    told = relax == "auto" and neutral is None and shares.get("lips", 1.0) > MOST  # lips that are seen tell of a smile
+    report["advice"] = SMILES_CLOSED if told and smiles_closed(fit) else None
     yield Progress(0.87, "Checking the anatomy")
     anatomy = anatomy_report(head)
     missing = tuple(n for n in SKIN if n not in given)
