@@ -95,6 +95,15 @@ def test_a_landmark_far_off_is_named(people, reference):
                 assert f'"{name}"' in _refusal(check_arrangement, rest, wrong)
 
 
+def test_of_landmarks_that_nobody_picked_none_is_to_be_placed_again(reference):
+    rest = reference.landmark_positions()
+    wrong = rest | {"prn": rest["prn"] + 40.0}
+    said = _refusal(check_arrangement, rest, wrong, set(rest))
+    assert "What was found" in said and '"prn"' in said and "--landmarks" in said and "again" not in said
+    for found in ((), set(rest) - {"n"}):
+        assert '"prn"' in (said := _refusal(check_arrangement, rest, wrong, found)) and "place it again" in said
+
+
 @pytest.mark.parametrize(("factor", "unit"), [(1000.0, "metres"), (10.0, "centimetres"), (25.4, "inches")])
 def test_wrong_units_are_named(people, reference, factor, unit):
     surface, marks = people["lps_infinite"]

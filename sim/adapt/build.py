@@ -93,7 +93,7 @@ def build_head(
     target = without_cuts(smooth) if "flat_ends" in out else smooth
     yield Progress(0.05, "Judging the landmarks")
     check_against_scan(given, target)
-    check_arrangement(reference.landmark_positions(), given)
+    check_arrangement(reference.landmark_positions(), given, found)
     yield Progress(0.08, "Judging the landmarks")
     check_on_surface(given, target)
     look = yield from portion(first_look(reference, target, given, out, found), 0.1, 0.3)

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The gate: landmarks and scan that cannot belong together are refused, with the reason and the remedy."""
 
+from collections.abc import Collection
+
 import numpy as np
 
 from ..anatomy.head import Head
@@ -87,10 +89,12 @@ def check_on_surface(landmarks: dict[str, np.ndarray], scan: Surface) -> None:
         )
 
 
-def check_arrangement(reference: dict[str, np.ndarray], given: dict[str, np.ndarray]) -> None:
+def check_arrangement(
+    reference: dict[str, np.ndarray], given: dict[str, np.ndarray], found: Collection[str] = ()
+) -> None:
     """Refuse landmarks that do not form a human face: sides exchanged, one misplaced, another scale or no face at all.
 
-    ``reference`` holds the reference head's landmarks (mm), ``given`` the scan's.
+    ``reference`` holds the reference head's landmarks (mm), ``given`` the scan's; ``found``, names of those that nobody picked.
 
     Raises
     ------
@@ -101,25 +105,28 @@ def check_arrangement(reference: dict[str, np.ndarray], given: dict[str, np.ndar
         return
     faces = Faces(reference, names)
     places = np.array([given[n] for n in names], dtype=float)
-    found = faces.likeness(places)
-    _refuse_exchanged(faces, places, found)
+    likeness = faces.likeness(places)
+    _refuse_exchanged(faces, places, likeness)
     if len(names) > 5:
-        worst = int(np.argmax(found.strange))
-        away = float(np.linalg.norm(found.off[worst])) * found.scale
-        if found.strange[worst] > STRANGE and away > ODD:
-            raise InputError(
-                f'The landmark "{names[worst]}" ({label(names[worst])}) lies {away:.0f} mm from where the others expect '
-                "it: place it again or leave it out."
-            )
-    if found.energy > UNLIKE * 3 * len(names):
-        worst = names[int(np.argmax(found.strange))]
+        worst = int(np.argmax(likeness.strange))
+        away = float(np.linalg.norm(likeness.off[worst])) * likeness.scale
+        if likeness.strange[worst] > STRANGE and away > ODD:
+            said = f'"{names[worst]}" ({label(names[worst])}) lies {away:.0f} mm from where the others expect it'
+            if found and set(names) <= set(found):
+                raise InputError(
+                    f"What was found in the scan is no likely face, as {said}: check that the scan shows a whole face, or "
+                    "give landmarks with --landmarks or by clicking them."
+                )
+            raise InputError(f"The landmark {said}: place it again or leave it out.")
+    if likeness.energy > UNLIKE * 3 * len(names):
+        worst = names[int(np.argmax(likeness.strange))]
         raise InputError(
             f'The landmarks do not form a face (the least likely is "{worst}", {label(worst)}): check their names and '
             "places against the scan."
         )
-    if not SCALE[0] < found.scale < SCALE[1]:
+    if not SCALE[0] < likeness.scale < SCALE[1]:
         raise InputError(
-            f"The landmarks make a head {found.scale:.2g} times the size of an adult's: check the units of scan and "
+            f"The landmarks make a head {likeness.scale:.2g} times the size of an adult's: check the units of scan and "
             "landmarks."
         )
 
