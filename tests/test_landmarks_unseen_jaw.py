@@ -15,6 +15,7 @@ from headshop.sim.landmarks import unseen_jaw
 from headshop.sim.landmarks.confidence import support
 from headshop.sim.landmarks.find import find_landmarks
 from headshop.sim.landmarks.first_look import first_look
+from headshop.sim.landmarks.placed_face import run
 from headshop.sim.landmarks.pose_search import Pose
 from headshop.sim.landmarks.shape_fit import ShapeFit
 from headshop.sim.landmarks.shape_space import shape_space
@@ -87,7 +88,7 @@ def test_a_jaw_that_is_pulled_up_is_laid_without_looking_for_it(reference, monke
 
     monkeypatch.setattr(unseen_jaw, "begun_again", begun_again)
     assert lip_to_chin(space, pulled) / lip_to_chin(space, _laid(space, space.points)) == pytest.approx(share, abs=0.01)
-    fit, left = _run(with_unseen_jaw(space, Surface(scan.vertices, scan.triangles), pulled))
+    fit, left = finish(run(with_unseen_jaw(space, Surface(scan.vertices, scan.triangles), pulled), 0.0, 1.0, ""))
     low = below_lips(space)
     assert (asked[0].area[low] == 0).all() and (asked[0].area[~low] == space.area[~low]).all()
     if share < PULLED_UP:
@@ -100,7 +101,8 @@ def test_a_chin_that_is_seen_is_looked_for(reference, monkeypatch):
     space = shape_space(reference)
     monkeypatch.setattr(unseen_jaw, "begun_again", None)
     fit = _laid(space, space.points)
-    assert _run(with_unseen_jaw(space, Surface(space.points, space.triangles), fit)) == (fit, space)
+    work = with_unseen_jaw(space, Surface(space.points, space.triangles), fit)
+    assert finish(run(work, 0.0, 1.0, "")) == (fit, space)
 
 
 def test_what_lies_below_the_lips(reference):
@@ -142,11 +144,3 @@ def test_a_head_whose_scan_ends_at_its_mouth_has_a_whole_mouth_and_chin(referenc
     assert built.fit["advice"] is None  # of a smile, which lips tell that are not seen
     low = np.linalg.norm(built.head.skin.vertices - true["pg"], axis=1) < 10
     assert (built.attributes["fitted"][low] == 0).all()
-
-
-def _run(work):
-    while True:
-        try:
-            next(work)
-        except StopIteration as end:
-            return end.value
