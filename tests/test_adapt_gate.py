@@ -102,6 +102,9 @@ def test_of_landmarks_that_nobody_picked_none_is_to_be_placed_again(reference):
     assert "What was found" in said and '"prn"' in said and "--landmarks" in said and "again" not in said
     for found in ((), set(rest) - {"n"}):
         assert '"prn"' in (said := _refusal(check_arrangement, rest, wrong, found)) and "place it again" in said
+    few = {n: rest[n] for n in ("ex_l", "ex_r", "ch_l", "ch_r")} | {"prn": rest["prn"] + [0.0, -90.0, 90.0]}
+    assert "What was found" in (said := _refusal(check_arrangement, rest, few, set(few))) and "names" not in said
+    assert "The landmarks do not form a face" in _refusal(check_arrangement, rest, few)
 
 
 @pytest.mark.parametrize(("factor", "unit"), [(1000.0, "metres"), (10.0, "centimetres"), (25.4, "inches")])

@@ -24,6 +24,11 @@ STRANGE = 6.5  # standard deviations of that expectation, is a mistake
 UNLIKE = 3.5  # variance of the whole arrangement relative to people's, above which it is no face
 GAIN = 12.0  # squared standard deviations that an exchange of names must save to count as a mistake
 SCALE = (0.45, 1.6)  # head size relative to the reference
+#: What is said of landmarks that nobody picked.
+NO_LIKELY_FACE = (
+    "What was found in the scan is no likely face, as {}: check that the scan shows a whole face, or give landmarks with "
+    "--landmarks or by clicking them."
+)
 RELIEF = 0.65  # correlation of relief with the reference's; faces have 0.78 and more, a ball and an egg 0.6 and less
 
 
@@ -107,22 +112,21 @@ def check_arrangement(
     places = np.array([given[n] for n in names], dtype=float)
     likeness = faces.likeness(places)
     _refuse_exchanged(faces, places, likeness)
-    if len(names) > 5:
-        worst = int(np.argmax(likeness.strange))
-        away = float(np.linalg.norm(likeness.off[worst])) * likeness.scale
-        if likeness.strange[worst] > STRANGE and away > ODD:
-            said = f'"{names[worst]}" ({label(names[worst])}) lies {away:.0f} mm from where the others expect it'
-            if found and set(names) <= set(found):
-                raise InputError(
-                    f"What was found in the scan is no likely face, as {said}: check that the scan shows a whole face, or "
-                    "give landmarks with --landmarks or by clicking them."
-                )
-            raise InputError(f"The landmark {said}: place it again or leave it out.")
-    if likeness.energy > UNLIKE * 3 * len(names):
-        worst = names[int(np.argmax(likeness.strange))]
+    unpicked = bool(found) and set(names) <= set(found)
+    worst = int(np.argmax(likeness.strange))
+    said = f'"{names[worst]}" ({label(names[worst])})'
+    away = float(np.linalg.norm(likeness.off[worst])) * likeness.scale
+    if len(names) > 5 and likeness.strange[worst] > STRANGE and away > ODD:
+        said += f" lies {away:.0f} mm from where the others expect it"
         raise InputError(
-            f'The landmarks do not form a face (the least likely is "{worst}", {label(worst)}): check their names and '
-            "places against the scan."
+            NO_LIKELY_FACE.format(said) if unpicked else f"The landmark {said}: place it again or leave it out."
+        )
+    if likeness.energy > UNLIKE * 3 * len(names):
+        raise InputError(
+            NO_LIKELY_FACE.format(f"{said} and others lie where no face has them")
+            if unpicked
+            else f"The landmarks do not form a face (the least likely is {said}): check their names and places against "
+            "the scan."
         )
     if not SCALE[0] < likeness.scale < SCALE[1]:
         raise InputError(

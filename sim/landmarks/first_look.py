@@ -87,10 +87,10 @@ def first_look(
     if space.of_infants:
         told = _told_of(space, pose, {n: p for n, p in clear.items() if n not in found})
     target = facing_out(space, target, pose)
-    coarse = target.coarser()
+    coarse, jaw_told = target.coarser(), any(name in given for name in JAW)
     try:
         fit = yield from run(fit_shape(space, coarse, pose, told=told), 0.0, 0.55, LOOKING)
-        if not any(name in given for name in JAW):
+        if not jaw_told:
             fit, space = yield from run(with_unseen_jaw(space, coarse, fit), 0.55, 0.58, LOOKING)
         if space.of_infants:
             fit = yield from run(with_mouth_in_place(space, coarse, fit), 0.58, 0.6, LOOKING)
@@ -119,7 +119,7 @@ def first_look(
     shows = hair_over(space, hair.fit, target, covered)
     left = target.without(held | shows)
     hidden = hidden_skin(space, fit, target.vertices[target.triangles[held].ravel()], left)
-    if not any(name in given for name in JAW):
+    if not jaw_told:
         hidden |= unseen_jaw(space, fit, left)
     filled = with_hidden_skin(space, fit, hidden, left)
     no_ear = space.ear < EAR  # ears take the reference's shape

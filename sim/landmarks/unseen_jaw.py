@@ -47,11 +47,10 @@ def lacks_chin(space: ShapeSpace, fit: ShapeFit, target: Surface) -> bool:
 
 def unseen_jaw(space: ShapeSpace, fit: ShapeFit, target: Surface) -> np.ndarray:
     """(n,) bool: the points of the lower lip and the skin under it that a scan ``target`` without a chin does not show."""
-    out = below_lips(space, FILLED)
     if not lacks_chin(space, fit, target):
-        return out & False
+        return np.zeros(len(fit.points), dtype=bool)
     _, trust, _ = pairs(space, fit.points, target, SEEN * fit.pose.scale)
-    return out & (trust == 0)
+    return below_lips(space, FILLED) & (trust == 0)
 
 
 def below_lips(space: ShapeSpace, reach: float = BELOW) -> np.ndarray:
