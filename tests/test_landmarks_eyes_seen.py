@@ -14,7 +14,7 @@ from headshop.sim.adapt.shut_eyes import with_shut_eyes
 from headshop.sim.anatomy.landmark_names import SKIN
 from headshop.sim.landmarks import expression
 from headshop.sim.landmarks.expression import fit_expression, shut_share
-from headshop.sim.landmarks.eye_gaps import EyeGaps, crevices, gaps_in_eyes
+from headshop.sim.landmarks.eye_gaps import EyeGaps, crevices, eyes_shown, gaps_in_eyes
 from headshop.sim.landmarks.lid_creases import lid_lines, shut_by_creases, told_of_lids
 from headshop.sim.landmarks.pose_search import Pose
 from headshop.sim.landmarks.shape_fit import CHANGE, Expression, Told, fit_shape
@@ -222,3 +222,31 @@ def test_a_skin_is_fitted_with_its_shut_lids_on_the_crease(reference, seen_skin,
     with pytest.raises(LookupError):
         finish(skin_fit.fit_skin(reference, target, {name: marks[name] for name in SKIN}))
     assert set(asked[0]) == set(BOTH) and all(isinstance(line, LidLine) for line in asked[0].values())
+
+
+def right_half(target):
+    """What ``target`` shows of the right half of a face, and 6 mm beyond the middle."""
+    return target.without(target.vertices[target.triangles][:, :, 0].max(axis=1) > 6.0)
+
+
+@pytest.mark.parametrize("sides", [(), BOTH])
+def test_of_half_a_face_the_eye_that_is_seen_tells(reference, seen_skin, sides):
+    """An eye of which nothing is seen counted as a hole as large as an open one."""
+    whole, marks = seen_skin(sides)
+    target = right_half(with_slit(whole, marks) if sides else whole)
+    laid = marks, np.eye(3), target
+    assert eyes_shown(*laid) == "r" and eyes_shown(marks, np.eye(3), whole) == "lr"
+    assert gaps_in_eyes(*laid).show_open
+    gaps = gaps_in_eyes(*laid, "r")
+    assert gaps.show_shut == bool(sides) and gaps.show_open != bool(sides)
+    space = shape_space(reference)
+    _, shown = finish(fit_expression(space, target, finish(fit_shape(space, target, HERE))))
+    assert set(shown.shut) == set(sides)
+    if not sides:
+        assert {"ps_r", "pi_r"} <= set(shown.lids) and not any(name.endswith("_l") for name in shown.lids)
+
+
+def test_where_neither_eye_is_seen_both_are_looked_at(seen_skin):
+    target, marks = seen_skin()
+    brow = target.without(target.vertices[target.triangles][:, :, 2].min(axis=1) < marks["ps_l"][2] + 2)
+    assert eyes_shown(marks, np.eye(3), brow) == "lr"

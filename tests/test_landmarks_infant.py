@@ -14,8 +14,8 @@ from headshop.sim.landmarks import first_look as first
 from headshop.sim.landmarks.first_look import first_look
 from headshop.sim.landmarks.infant import infant_points, infant_space, with_mouth_in_place
 from headshop.sim.landmarks.lip_line import lip_height, lip_line
+from headshop.sim.landmarks.looks import LOOKS, PARTS
 from headshop.sim.landmarks.picked import moved
-from headshop.sim.landmarks.placed_face import LOOKS, PARTS
 from headshop.sim.landmarks.pose_search import Pose
 from headshop.sim.landmarks.shape_fit import fit_shape
 from headshop.sim.landmarks.shape_space import shape_space

@@ -8,7 +8,7 @@ from ..adapt.closest import Surface
 from ..adapt.lid_line import PLAIN, LidLine
 from ..relax.mouth_gap import lip_edges
 from ..relax.upper_teeth import incisal_edge
-from .eye_gaps import EyeGaps, gaps_in_eyes
+from .eye_gaps import EyeGaps, eyes_shown, gaps_in_eyes
 from .eye_sockets import socket_corners
 from .eyeballs_seen import eyeballs_seen
 from .lid_creases import lid_lines, shut_by_creases, told_of_lids
@@ -82,17 +82,19 @@ def _fit_lids(space, target, fit, parted, told):
     marks = space.landmarks(fit.points)
     corners = socket_corners(marks, fit.matrix, target)
     laid = marks | corners, fit.matrix, target
-    gaps = gaps_in_eyes(*laid)
+    sides = eyes_shown(*laid)  # eyes are open or shut alike: one that is not seen as the other
+    gaps = gaps_in_eyes(*laid, sides)
     eyeballs = eyeballs_seen(*laid)
     known_open = gaps.show_open or bool(eyeballs) or bool(corners)
-    seen = corners | open_lids(*laid, eyeballs) if known_open else {}
+    seen = corners | open_lids(*laid, eyeballs, sides) if known_open else {}
     if seen:
         lids = told_of_open_lids(space, fit, seen)
         return (yield from changed(Expression(parted), fit.coefficients, lids)), Expression(parted, lids=seen)
-    lines, share = lid_lines(space, fit, target), shut_share(space, fit)
-    shut = False if known_open else shut_by_sight(gaps, lines, share)
+    lines, share = lid_lines(space, fit, target, sides), shut_share(space, fit)
+    seen_share = {side: share[side] for side in sides}
+    shut = False if known_open else shut_by_sight(gaps, lines, seen_share)
     if shut is False:
-        if max(share.values()) <= DROOPED:
+        if max(seen_share.values()) <= DROOPED:
             return fit, Expression(parted)
         wide = Expression(parted, wide=True)
         return (yield from changed(wide, fit.coefficients)), wide
@@ -101,7 +103,7 @@ def _fit_lids(space, target, fit, parted, told):
     if shut:
         return (yield from changed(both, shutting, told_of_lids(space, fit, lines))), both
     rival, about = (yield from changed(both, shutting)), eyes(space)
-    better = min(share.values()) > SHUT or cost(space, rival, about) < REASON * cost(space, fit, about)
+    better = min(seen_share.values()) > SHUT or cost(space, rival, about) < REASON * cost(space, fit, about)
     return (rival, both) if better else (fit, Expression(parted))
 
 

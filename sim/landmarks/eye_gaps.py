@@ -21,11 +21,12 @@ SPECK, SLIT = 0.5, 3.0  # mm that what is lacking extends over on a line: less i
 #: Shares of the lines: of 35 scans of open eyes .45 and more gape where there are holes at all, of 12 of shut ones up to .09,
 #: and .41 or more have a slit.
 GAPING, SLITS = 0.3, 0.3
+SHOWN = 0.5  # share of the lines with something above and below an eye, from which on the scan shows it
 
 
 @dataclass(frozen=True)
 class EyeGaps:
-    """gaping, slits : share of the lines over both eyes on which what the scan lacks extends over more than a slit, or over no
+    """gaping, slits : share of the lines over the eyes on which what the scan lacks extends over more than a slit, or over no
     more than one."""
 
     gaping: float
@@ -42,19 +43,29 @@ class EyeGaps:
         return not self.show_open and self.slits >= SLITS
 
 
-def gaps_in_eyes(marks, matrix, target: Surface) -> EyeGaps:
-    """The `EyeGaps` of a scan.
+def eyes_shown(marks, matrix, target: Surface) -> str:
+    """The sides, of "lr", of eyes of which a scan shows what is above and below them; both where it does of neither.
 
     marks : name -> (3,) mm in the scan; matrix (3, 3) turns and scales the reference into it
     """
-    heights = np.linspace(ACROSS, -ACROSS, LINE)
-    eyes = [eye_frame(marks, side, matrix) for side in "lr"]
-    depth = np.concatenate([eye.depth(target, eye.lines(EYE_LINES, heights)) for eye in eyes])
+    shown = [np.isfinite(over_the_eye(_depth(marks, matrix, target, side))).all(axis=1).mean() for side in "lr"]
+    return "".join(side for side, share in zip("lr", shown, strict=True) if share > SHOWN) or "lr"
+
+
+def gaps_in_eyes(marks, matrix, target: Surface, sides: str = "lr") -> EyeGaps:
+    """The `EyeGaps` of a scan, in the eyes on these ``sides``; the rest as in `eyes_shown`."""
+    depth = np.concatenate([_depth(marks, matrix, target, side) for side in sides])
     lacking = np.isnan(depth) | (depth - over_the_eye(depth) > SOCKET) | crevices(depth)
     first, last = lacking.argmax(axis=1), LINE - 1 - lacking[:, ::-1].argmax(axis=1)
     extent = np.where(lacking.any(axis=1), (last - first + 1) * 2 * ACROSS / (LINE - 1), 0.0)
     gapes = extent > SLIT
     return EyeGaps(float(gapes.mean()), float((~gapes & (extent > SPECK)).mean()))
+
+
+def _depth(marks, matrix, target, side):
+    """(k, n) mm: how far the scan lies behind lines over the eye on that ``side``; NaN where it has nothing."""
+    eye = eye_frame(marks, side, matrix)
+    return eye.depth(target, eye.lines(EYE_LINES, np.linspace(ACROSS, -ACROSS, LINE)))
 
 
 def over_the_eye(depth) -> np.ndarray:

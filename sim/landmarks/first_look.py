@@ -20,7 +20,7 @@ from ..relax.mouth_gap import MARKS
 from .confidence import in_mid_air
 from .expression import fit_expression
 from .held_by_lips import held_by_lips
-from .hidden_skin import UNSEEN, hidden_skin, unseen_scalp, with_hidden_skin
+from .hidden_skin import UNSEEN, hidden_skin, unseen_face, unseen_scalp, with_hidden_skin
 from .infant import likelier_space, with_mouth_in_place
 from .lids_told import lids_told
 from .picked import moved, picked
@@ -121,6 +121,8 @@ def first_look(
     hidden = hidden_skin(space, fit, target.vertices[target.triangles[held].ravel()], left)
     if not jaw_told:
         hidden |= unseen_jaw(space, fit, left)
+    picks = np.reshape([given[n] for n in names if n not in found], (-1, 3))
+    hidden |= unseen_face(space, fit, left, picks[in_mid_air(left, picks)])
     filled = with_hidden_skin(space, fit, hidden, left)
     no_ear = space.ear < EAR  # ears take the reference's shape
     filled = with_hidden_skin(space, hair.fit, covered & no_ear, filled)

@@ -16,6 +16,9 @@ from .shape_fit import ShapeFit, pairs
 from .shape_space import ShapeSpace
 
 BEHIND, SEEN = 9.0, 3.0  # mm to which a thing hides skin behind it; from which on skin is not seen
+#: mm from an unseen part of the face to the scan, at least, as smaller holes are spanned well enough; from there to what is
+#: unseen beside it; from a place that is known, about which that tells more.
+WIDE, BESIDE, NEAR_KNOWN = 10.0, 15.0, 20.0
 NO_DATA = 20.0  # mm from unseen scalp to the scan, at least
 TRUSTED = 0.3  # of `ShapeFit.trust`
 #: Of `ShapeSpace.ear`: from there on a place tells how this ear is shaped, not where the skin beside it lies.
@@ -42,6 +45,22 @@ def unseen_scalp(space: ShapeSpace, fit: ShapeFit, target: Surface) -> np.ndarra
     scalp = np.flatnonzero(space.hairy & (space.points[:, 2] > space.landmarks(space.points)["t_l"][2]))
     out = np.zeros(len(fit.points), dtype=bool)
     out[scalp] = ~target.closest(fit.points[scalp], NO_DATA * fit.pose.scale).found
+    return out
+
+
+def unseen_face(space: ShapeSpace, fit: ShapeFit, target: Surface, known=()) -> np.ndarray:
+    """(n,) bool: the points of the face that the scan ``target`` lacks, with much beside them, but shows on its other side, and
+    that are not near any of the places ``known`` (k, 3) mm."""
+    out, scale = np.zeros(len(fit.points), dtype=bool), fit.pose.scale
+    _, trust, _ = pairs(space, fit.points, target, SEEN * scale)
+    unseen = np.flatnonzero((space.face > 0.5) & (space.ear < EARLESS) & (trust == 0))
+    twin = cKDTree(space.points).query(space.points[unseen] * MIRROR)[1]
+    unseen = unseen[trust[twin] > 0]
+    far = unseen[~target.closest(fit.points[unseen], WIDE * scale).found]
+    if len(far):
+        out[unseen] = cKDTree(fit.points[far]).query(fit.points[unseen])[0] < BESIDE * scale
+    if len(known):
+        out &= cKDTree(known).query(fit.points)[0] > NEAR_KNOWN * scale
     return out
 
 

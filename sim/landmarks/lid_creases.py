@@ -10,14 +10,14 @@ from .shape_fit import ShapeFit, Told
 from .shape_space import ShapeSpace
 
 
-def lid_lines(space: ShapeSpace, fit: ShapeFit, target: Surface) -> dict[str, LidLine]:
-    """Side -> the `LidLine` of the eyes of the scan on which the head ``fit`` is laid."""
+def lid_lines(space: ShapeSpace, fit: ShapeFit, target: Surface, sides: str = "lr") -> dict[str, LidLine]:
+    """Side -> the `LidLine` of the eyes on these ``sides`` of the scan on which the head ``fit`` is laid."""
     marks = space.landmarks(fit.points)
-    return {side: lid_line(marks, side, target, fit.matrix) for side in "lr"}
+    return {side: lid_line(marks, side, target, fit.matrix) for side in sides}
 
 
 def shut_by_creases(lines: dict[str, LidLine]) -> bool | None:
-    """Whether the creases of both eyes, side -> `LidLine`, show them shut; None: they do not tell."""
+    """Whether the creases of eyes, side -> `LidLine`, show them shut; None: they do not tell."""
     if min(line.depth for line in lines.values()) < PLAIN:
         return None
     return float(np.mean([line.second / line.depth for line in lines.values()])) < SECOND

@@ -28,8 +28,11 @@ NEAR = 9.0  # mm before or behind where a lid is taken to lie: what lies farther
 MARGIN = {"ps": 0.5, "pi": -0.2}  # mm from the arch to where people pick the margin of the lid
 
 
-def open_lids(marks, matrix, target: Surface, eyeballs: dict[str, Eyeball] | None = None) -> dict[str, np.ndarray]:
-    """Name -> (3,) mm: ``ps`` and ``pi`` of both eyes, on the margins of their lids; nothing if these are not seen plainly.
+def open_lids(
+    marks, matrix, target: Surface, eyeballs: dict[str, Eyeball] | None = None, sides: str = "lr"
+) -> dict[str, np.ndarray]:
+    """Name -> (3,) mm: ``ps`` and ``pi`` of the eyes on these ``sides``, on the margins of their lids; nothing if these are not
+    seen plainly.
 
     Of a scan whose eyes are known to be open: other creases, on shut lids or of wrinkles, may look alike.
 
@@ -38,7 +41,7 @@ def open_lids(marks, matrix, target: Surface, eyeballs: dict[str, Eyeball] | Non
     """
     heights = np.arange(TOP, BOTTOM - STEP / 2, -STEP)
     upper, lower, seen = 0.0, 0.0, {}
-    for side in "lr":
+    for side in sides:
         eye = eye_frame(marks, side, matrix)
         places = eye.lines(SHARES, heights)
         depth = eye.depth(target, places)
@@ -48,7 +51,7 @@ def open_lids(marks, matrix, target: Surface, eyeballs: dict[str, Eyeball] | Non
             worth[eyeballs[side].shows(eye.behind(places, depth))] = 1.0
         above, below = arches(worth)
         upper, lower, seen[side] = upper + above, lower + below, (eye, places, depth)
-    pair = best_pair(upper, lower)
+    pair = best_pair(upper * (2 / len(sides)), lower * (2 / len(sides)))
     if pair is None:
         return {}
     out = {}

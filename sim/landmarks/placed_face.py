@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A face laid on a scan in any turn: placements are tried coarsely, the likeliest fitted in full, and the best judged."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -16,10 +16,11 @@ from ..scan.face_match import face_template, surface_samples
 from ..scan.flat_cuts import beyond
 from .confidence import like_ears
 from .infant import infant_points, infant_space
-from .pose_search import LOOKING, STARTS, SURVIVORS, Pose, search_poses
+from .looks import CLEAR, LOOKS, PARTS, PLAIN, WHOLE, templates_of
+from .pose_search import LOOKING, Pose, search_poses
 from .shape_fit import LEAST, TRIAL, NoFaceError, ShapeFit, fit_shape
 from .shape_space import ShapeSpace
-from .verdict import ODD, judged, likeness_of, misfit_of, weighed
+from .verdict import ODD, judged, likeness_of, misfit_of, share_of, weighed
 
 FITTING = "Fitting a face"
 NO_FACE = (
@@ -30,49 +31,6 @@ TRIAL_MODES = 40
 #: circumference in ANSUR, Gordon et al. 1989), and women's heads are 4 % smaller than men's; children's are smaller yet. Where
 #: a scan shows much of a head this tells little; where a face is cut off all round it keeps size and shape apart.
 SIZE = 0.05
-
-
-@dataclass(frozen=True)
-class Look:
-    """One look for a face.
-
-    infant : whether it is an infant's face that is looked for
-    size : of the reference's, the face that is looked for to begin with
-    starts, survivors : see `search_poses`
-    tried : placements that are looked at closely
-    most, worse : how many of them are followed, and how much worse than the best these may fit at first
-    further : how many are, whatever they fit like, while none shows a face
-    again : how many of those are begun again, the first of them and, while none shows a face, others
-    relief : correlation with the relief of a face that is enough. Faces have 0.66 and more, most of them 0.8; balls, boxes
-        and backs of heads 0.4; the best of many places where none is, 0.6.
-    weigh : power of that correlation by which a placement's misfit is divided when the likeliest are chosen. A face seen from
-        above fits worse than the top of its head, round and whole, on which any dome of a forehead lies.
-    """
-
-    infant: bool
-    size: float
-    starts: int
-    survivors: int
-    tried: int
-    most: int
-    worse: float
-    further: int
-    again: int
-    relief: float
-    weigh: float
-
-
-#: The second is taken if the first shows no plain face: a thorough one, which begins with a small face, because a large one
-#: on a small head finds no hold. If that shows none, the third looks for an infant's.
-LOOKS = (
-    Look(False, 1.0, STARTS, SURVIVORS, 10, 3, 1.25, 5, 2, 0.53, 0.0),
-    Look(False, 0.8, 1000, 400, 14, 4, np.inf, 4, 4, 0.7, 2.0),
-    Look(True, 0.7, 1000, 400, 14, 4, np.inf, 4, 4, 0.7, 2.0),
-)
-#: Shares of the work at which trials of each look begin, and its fits begin and end.
-PARTS = ((0.0, 0.5, 0.75), (0.75, 0.83, 0.88), (0.88, 0.94, 0.98))
-PLAIN = 0.66  # relief from which on a first look is enough: faces have as much
-CLEAR = 0.75  # relief from which on nothing better is looked for
 #: mm on the reference by which the nose of an infant's face may lie lower than that of one laid on it upside down.
 LOWER = (0.0, 30.0, 60.0)
 #: What an odd face is bad as an infant's, of what it is as a grown one's, below which it is one. Six of MakeHuman's infants and
@@ -111,7 +69,8 @@ def place_face(mesh: Mesh, reference: Head, space: ShapeSpace, unit_scales) -> W
             continue
         best = min(seen, key=_by_likeness if look.infant else lambda t: t[0])
         verdict = best[0]
-        if not verdict.doubtful and (verdict.likeness > PLAIN or look is not LOOKS[0]):
+        plain = verdict.likeness > PLAIN and share_of(space, best[2]) > WHOLE
+        if not verdict.doubtful and (plain or look is not LOOKS[0]):
             if look.infant:
                 best = yield from portion(_or_turned_over(reference, best), high, 1.0)
             elif verdict.bad > ODD:
@@ -131,10 +90,11 @@ def _trials(look, reference, few, mesh, samples, template, scale) -> Work:
     samples = samples[~beyond(ends, samples * scale)]
     if len(samples) < LEAST:
         return []
-    work = search_poses(samples * scale, look.size * template, look.tried, look.starts, look.survivors)
-    poses = yield from portion(work, 0.0, 0.5)
+    poses, trials, parts = [], [], templates_of(look, template)
+    for k, part in enumerate(parts):
+        work = search_poses(samples * scale, look.size * part, look.tried, look.starts, look.survivors)
+        poses += yield from portion(work, 0.5 * k / len(parts), 0.5 * (k + 1) / len(parts))
     yield Progress(0.5, LOOKING)
-    trials = []
     for k, pose in enumerate(poses):
         pose = replace(pose, scale=pose.scale * look.size)
         outward = facing_out(few, target, pose)

@@ -3,8 +3,8 @@
 
 A Gaussian process over the skin in low rank (Lüthi et al. 2018, Gaussian process morphable models): the variation of
 our own random individuals, which is linear in what they draw (`sim.scan.individual`), smooth displacements on three
-scales for what their measurements do not name, and the ways in which a scanned face departs from rest most, an
-open jaw and a smile. Its mean is the reference with a higher crown.
+scales, much the same left and right, for what their measurements do not name, and the ways in which a scanned face
+departs from rest most, an open jaw and a smile. Its mean is the reference with a higher crown.
 """
 
 from dataclasses import dataclass, replace
@@ -22,6 +22,10 @@ from ..scan.individual import variation
 
 #: Smooth displacements: reach in mm, standard deviation in mm, whether for the face only.
 SCALES = ((90.0, 6.0, False), (45.0, 2.5, False), (24.0, 1.5, True))
+#: Correlation of left and right. Without it, the half of a face that a scan lacks was laid as in the likeliest face, whatever
+#: the other half is like.
+ALIKE = 0.95
+MIRROR = np.array([-1.0, 1.0, 1.0])
 #: mm by which the vertex of the likeliest head lies above the reference's, and above nasion in which that sets in. From n to v
 #: the reference has .82 of what it has from n to gn; ten heads (MakeHuman's, Lee Perry-Smith's, a mannequin's) and nine of
 #: ICT-FaceKit's have .83 to 1.04, .91 on average. With the reference's, crowns that no scan shows were too low on nearly all.
@@ -198,12 +202,22 @@ def _smooth(points, reach, sd, where=None):
     """Modes (n, 3, 3 c) of a Gaussian process of the given reach and deviation, exact at c even places (Nyström)."""
     places = points if where is None else points[where]
     centres = places[farthest(places, reach)]
-    root = cholesky(_gauss(centres, centres, reach) + 1e-4 * np.eye(len(centres)), lower=True)
-    shapes = sd * solve_triangular(root, _gauss(centres, points, reach), lower=True).T
     out = np.zeros((len(points), 3, 3 * len(centres)))
-    for axis in range(3):
-        out[:, axis, axis::3] = shapes
+    for axis, sign in enumerate(MIRROR):
+        root = cholesky(_alike(centres, centres, reach, sign) + 1e-4 * np.eye(len(centres)), lower=True)
+        out[:, axis, axis::3] = sd * solve_triangular(root, _alike(centres, points, reach, sign), lower=True).T
     return out
+
+
+def _alike(a, b, reach, sign):
+    """(j, k) covariance, as a share of the variance, of displacements at ``a`` (j, 3) and ``b`` (k, 3) mm along an axis that
+    has that ``sign`` in a mirror. Across the middle (sign -1) those of the middle itself vary little."""
+
+    def deviation(points):
+        return np.sqrt(1 + max(sign, 0) * ALIKE * np.exp(-2 * points[:, 0] ** 2 / reach**2))
+
+    both = _gauss(a, b, reach) + sign * ALIKE * _gauss(a, b * MIRROR, reach)
+    return both / np.outer(deviation(a), deviation(b))
 
 
 def farthest(points: np.ndarray, spacing: float) -> np.ndarray:

@@ -1,0 +1,180 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Scans of one side of a face, as a scanner beside it or a cut through the middle leaves them: the other side is told by it."""
+
+import numpy as np
+import pytest
+
+from headshop.sim.adapt.build import build_head
+from headshop.sim.adapt.closest import Surface
+from headshop.sim.landmarks import looks, placed_face
+from headshop.sim.landmarks.find import find_landmarks
+from headshop.sim.landmarks.hidden_skin import WIDE, unseen_face, with_hidden_skin
+from headshop.sim.landmarks.looks import LOOKS, PARTS, WHOLE, templates_of
+from headshop.sim.landmarks.pose_search import Pose
+from headshop.sim.landmarks.shape_fit import ShapeFit
+from headshop.sim.landmarks.shape_space import MIRROR, shape_space
+from headshop.sim.landmarks.verdict import Verdict
+from headshop.sim.mesh import Mesh, vertex_normals
+from headshop.sim.progress import finish
+from headshop.sim.scan.face_match import face_template
+from headshop.sim.scan.individual import draw_field
+
+SIDES = {"l": 1.0, "r": -1.0}
+BEYOND = 6.0  # mm beyond the middle at which a half ends
+#: Landmarks of a face that tell sides.
+PAIRED = ("en", "ex", "al", "ch", "zy", "go")
+
+
+@pytest.fixture(scope="module")
+def space(reference):
+    return shape_space(reference)
+
+
+@pytest.fixture(scope="module")
+def somebody(reference):
+    """Somebody's whole head, alike on both sides but for a millimetre or so, and the true landmarks (mm)."""
+    field = draw_field(reference.landmark_positions(), np.random.default_rng(3))
+    points = reference.skin.vertices + field(reference.skin.vertices)
+    others = {name: part.vertices for name, part in reference.parts.items()}
+    return reference.skin.moved(points), reference.landmarks.on(others | {"skin": points})
+
+
+def half_of(mesh: Mesh, side: str) -> Mesh:
+    """The ``side`` of a head, to a little beyond the middle."""
+    across = SIDES[side] * mesh.vertices[mesh.triangles][:, :, 0]
+    return Mesh.from_triangles(mesh.vertices, mesh.triangles[across.min(axis=1) > -BEYOND])
+
+
+def laid(space, points, target):
+    """A `ShapeFit` that has the skin at ``points`` (n, 3) mm."""
+    n, modes = len(points), space.modes.shape[2]
+    pose = Pose(1.0, np.eye(3), np.zeros(3), 0.0)
+    return ShapeFit(points, np.zeros(modes), pose, np.ones(n), np.zeros(n), np.zeros((modes, modes)))
+
+
+def without(space, hole):
+    """The skin of the ``space`` as a scan without the points ``hole`` (n,) bool."""
+    return Surface(space.points, space.triangles[~hole[space.triangles].any(axis=1)])
+
+
+def test_left_and_right_go_together(space, reference):
+    marks = reference.landmark_positions()
+
+    def draws(name):
+        k = np.linalg.norm(space.points - marks[name], axis=1).argmin()
+        return space.modes[k]
+
+    for name in ("ex", "zy", "ch"):
+        left, right = draws(f"{name}_l"), draws(f"{name}_r") * MIRROR[:, None]
+        together = (left * right).sum(axis=1)
+        apart = np.sqrt((left**2).sum(axis=1) * (right**2).sum(axis=1))
+        assert (together / apart > 0.7).all(), name
+    across = [np.linalg.norm(draws(name)[0]) for name in ("n", "prn", "sn", "pg")]
+    assert max(across) < 0.5 * np.linalg.norm(draws("zy_l")[0])
+
+
+def test_half_a_face_is_looked_for_as_either_half(reference):
+    template = face_template(reference)
+    halves = [templates_of(look, template) for look in LOOKS if look.half]
+    assert halves and len(LOOKS) == len(PARTS)
+    for left, right in halves:
+        assert (left[:, 0] > -looks.MIDDLE).all() and (right[:, 0] < looks.MIDDLE).all()
+        assert all((each[0] == template[0]).all() for each in (left, right))  # the tip of the nose
+        assert len(template) < len(left) + len(right) < 1.4 * len(template)
+    for look in LOOKS:
+        if not look.half:
+            (whole,) = templates_of(look, template)
+            assert whole is template
+
+
+@pytest.mark.parametrize("side", "lr")
+def test_half_a_head_is_found(reference, somebody, side):
+    mesh, true = somebody
+    turn = np.linalg.qr(np.random.default_rng(ord(side)).normal(size=(3, 3)))[0]
+    turn *= np.sign(np.linalg.det(turn))
+    half = half_of(mesh, side)
+    found = finish(find_landmarks(Mesh.from_triangles(half.vertices @ turn.T, half.triangles), reference))
+    off = {n: np.linalg.norm(found.positions[n] - true[n] @ turn.T) for n in found.positions if n in true}
+    other = {"l": "r", "r": "l"}[side]
+    assert np.mean([off[f"{n}_{side}"] for n in PAIRED]) < 4.0
+    assert np.mean([off[f"{n}_{other}"] for n in PAIRED]) < 6.0
+    assert {f"{n}_{other}" for n in ("en", "ex", "ch", "zy")} <= set(found.mid_air)
+
+
+def test_half_a_face_is_looked_for_where_little_of_one_is_found(reference, space, somebody, monkeypatch):
+    """A face laid on half of one need not be in its place, however plain it is."""
+    shares, looked = iter([WHOLE - 0.01, 0.1, WHOLE + 0.01]), []
+    laid_on = object()
+
+    def trials(look, *_):
+        looked.append(look)
+        return [(1.0, 1.0, laid_on, laid_on)]
+        yield
+
+    def fits(*_):
+        return [(Verdict(False, 1.0, 0.9), 1.0, laid_on, laid_on)]
+        yield
+
+    monkeypatch.setattr(placed_face, "_trials", trials)
+    monkeypatch.setattr(placed_face, "_fits", fits)
+    monkeypatch.setattr(placed_face, "share_of", lambda *_: next(shares))
+    for of_half in ([False, True], [False]):
+        looked.clear()
+        finish(placed_face.place_face(somebody[0], reference, space, (1.0,)))
+        assert [look.half for look in looked] == of_half
+
+
+def test_what_a_scan_shows_on_the_other_side_only_is_filled_in(space):
+    left = space.points[:, 0] > BEYOND
+    fit = laid(space, space.points, None)
+    hidden = unseen_face(space, fit, without(space, ~left))
+    assert hidden.sum() > 100 and not hidden[left].any()
+    assert (space.face[hidden] > 0.5).all()
+    marks = space.landmarks(space.points)
+    cheek = np.linalg.norm(space.points - (marks["zy_r"] + marks["ch_r"]) / 2, axis=1)
+    assert hidden[(cheek < 20) & (space.face > 0.5) & (space.ear < 0.05)].all()
+    assert not unseen_face(space, fit, without(space, cheek < WIDE - 3)).any()  # a small hole
+    assert unseen_face(space, fit, without(space, cheek < 2.5 * WIDE)).any()
+    both = np.abs(space.points[:, 0]) > 25
+    assert not unseen_face(space, fit, without(space, both))[both].any()  # nothing tells
+
+
+def test_skin_near_a_place_that_is_known_is_not_filled_in(space):
+    fit, target = laid(space, space.points, None), without(space, space.points[:, 0] < -BEYOND)
+    known = space.landmarks(space.points)["ch_r"]
+    near = np.linalg.norm(space.points - known, axis=1) < 18
+    assert unseen_face(space, fit, target)[near].any()
+    kept = unseen_face(space, fit, target, [known])
+    assert kept.any() and not kept[near].any()
+
+
+def test_the_other_side_is_filled_in_as_this_one_is(space):
+    """A cheek that is fuller than the likeliest head's is so on the side that the scan lacks, too."""
+    normals = vertex_normals(space.points, space.triangles)
+    marks = space.landmarks(space.points)
+    full = sum(
+        3.0 * np.exp(-(np.linalg.norm(space.points - (marks[f"zy_{s}"] + marks[f"ch_{s}"]) / 2, axis=1) ** 2) / 400)
+        for s in SIDES
+    )
+    person = space.points + full[:, None] * normals
+    fit = laid(space, space.points, None)
+    shown = person[:, 0] > -BEYOND
+    scan = Surface(person, space.triangles[shown[space.triangles].all(axis=1)])
+    hidden = unseen_face(space, fit, scan)
+    filled = with_hidden_skin(space, fit, hidden, scan)
+    cheek = hidden & (full > 1.0)
+    found = filled.closest(person[cheek], 10.0)
+    assert cheek.sum() > 5 and found.found.all() and found.distance.mean() < 0.5 < full[cheek].mean() / 2
+
+
+def test_a_head_is_built_from_half_of_it(reference, somebody):
+    mesh, true = somebody
+    half = half_of(mesh, "r")
+    marks = {n: p for n, p in true.items() if n[-2:] != "_l" and p[0] < BEYOND and n not in ("v", "op")}
+    built = finish(build_head(reference, half, marks, detail=0))
+    assert built.attributes["hidden"][built.head.groups["face"] > 0.5].any()
+    other = (np.asarray(built.head.groups["face"]) > 0.5) & (np.asarray(built.head.groups["inner"]) < 0.5)
+    other &= built.head.skin.vertices[:, 0] > BEYOND
+    off = Surface(mesh.vertices, mesh.triangles).closest(built.head.skin.vertices[other], 30.0).distance
+    assert np.mean(off) < 1.6 and np.percentile(off, 95) < 4.0
+    assert (built.attributes["fitted"][other] < 0.5).mean() > 0.7  # and said to be invented
