@@ -9,13 +9,13 @@ from headshop.sim.adapt.closest import Surface
 from headshop.sim.landmarks import looks, placed_face
 from headshop.sim.landmarks.find import find_landmarks
 from headshop.sim.landmarks.hidden_skin import WIDE, unseen_face, with_hidden_skin
-from headshop.sim.landmarks.looks import LOOKS, PARTS, WHOLE, templates_of
+from headshop.sim.landmarks.looks import LOOKS, PARTS, QUICK, WHOLE, templates_of
 from headshop.sim.landmarks.pose_search import Pose
 from headshop.sim.landmarks.shape_fit import ShapeFit
 from headshop.sim.landmarks.shape_space import MIRROR, shape_space
 from headshop.sim.landmarks.verdict import Verdict
 from headshop.sim.mesh import Mesh, vertex_normals
-from headshop.sim.progress import finish
+from headshop.sim.progress import Progress, finish
 from headshop.sim.scan.face_match import face_template
 from headshop.sim.scan.individual import draw_field
 
@@ -101,27 +101,38 @@ def test_half_a_head_is_found(reference, somebody, side):
     assert {f"{n}_{other}" for n in ("en", "ex", "ch", "zy")} <= set(found.mid_air)
 
 
-def test_half_a_face_is_looked_for_where_little_of_one_is_found(reference, space, somebody, monkeypatch):
-    """A face laid on half of one need not be in its place, however plain it is."""
-    shares, looked = iter([WHOLE - 0.01, 0.1, WHOLE + 0.01]), []
-    laid_on = object()
+@pytest.mark.parametrize(
+    ("first", "share", "taken"),
+    [
+        (Verdict(False, 1.0, 0.9), WHOLE + 0.01, 1),
+        (
+            Verdict(False, 1.0, 0.9),
+            WHOLE - 0.01,
+            2,
+        ),  # laid on half a face, it need not be in its place, however plain it is
+        (Verdict(False, 1.0, 0.56), WHOLE + 0.01, 3),  # hardly like a face, it waits for a thorough look all the same
+    ],
+)
+def test_half_a_face_is_looked_for_where_little_of_one_is_found(
+    reference, space, somebody, monkeypatch, first, share, taken
+):
+    looked, laid_on = [], object()
 
     def trials(look, *_):
         looked.append(look)
+        yield Progress(0.5, "")
         return [(1.0, 1.0, laid_on, laid_on)]
-        yield
 
-    def fits(*_):
-        return [(Verdict(False, 1.0, 0.9), 1.0, laid_on, laid_on)]
-        yield
+    def fits(look, *_):
+        yield Progress(0.5, "")
+        return [(first if look in QUICK else Verdict(True, 9.0, 0.3), 1.0, laid_on, laid_on)]
 
     monkeypatch.setattr(placed_face, "_trials", trials)
     monkeypatch.setattr(placed_face, "_fits", fits)
-    monkeypatch.setattr(placed_face, "share_of", lambda *_: next(shares))
-    for of_half in ([False, True], [False]):
-        looked.clear()
-        finish(placed_face.place_face(somebody[0], reference, space, (1.0,)))
-        assert [look.half for look in looked] == of_half
+    monkeypatch.setattr(placed_face, "share_of", lambda *_: share)
+    _, fit, _, _ = finish(placed_face.place_face(somebody[0], reference, space, (1.0,)))
+    assert looked == list(LOOKS[:taken]) and fit is laid_on
+    assert [look.half for look in LOOKS[:2]] == [False, True]
 
 
 def test_what_a_scan_shows_on_the_other_side_only_is_filled_in(space):

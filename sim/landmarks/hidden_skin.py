@@ -13,7 +13,7 @@ from scipy.spatial.distance import cdist
 from ..adapt.closest import Surface
 from ..mesh import vertex_normals
 from .shape_fit import ShapeFit, pairs
-from .shape_space import ShapeSpace
+from .shape_space import MIRROR, ShapeSpace
 
 BEHIND, SEEN = 9.0, 3.0  # mm to which a thing hides skin behind it; from which on skin is not seen
 #: mm from an unseen part of the face to the scan, at least, as smaller holes are spanned well enough; from there to what is
@@ -28,7 +28,6 @@ EARLESS = 0.05
 COVERED, UNSEEN = (30.0, 2.0, 9.0), (60.0, 4.0, 25.0)
 ROUGH = 0.5  # mm: deviation of each height
 ALIKE = 0.8  # correlation of left and right
-MIRROR = np.array([-1.0, 1.0, 1.0])
 
 
 def hidden_skin(space: ShapeSpace, fit: ShapeFit, things, left: Surface) -> np.ndarray:

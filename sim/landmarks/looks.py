@@ -43,9 +43,12 @@ class Look:
 #: The first shows most faces. The second, for half of one, is taken if it shows no plain face or little of one. If there is
 #: no plain face yet the third is, a thorough one, which begins with a small face, because a large one on a small head finds
 #: no hold. If that shows none, the last looks for an infant's.
-LOOKS = (
+QUICK = (
     Look(False, False, 1.0, STARTS, SURVIVORS, 10, 3, 1.25, 5, 2, 0.53, 0.0),
     Look(False, True, 1.0, STARTS, SURVIVORS, 4, 2, 1.25, 2, 1, 0.7, 2.0),
+)
+LOOKS = (
+    *QUICK,
     Look(False, False, 0.8, 1000, 400, 14, 4, np.inf, 4, 4, 0.7, 2.0),
     Look(True, False, 0.7, 1000, 400, 14, 4, np.inf, 4, 4, 0.7, 2.0),
 )
@@ -53,7 +56,7 @@ LOOKS = (
 PARTS = ((0.0, 0.5, 0.7), (0.7, 0.73, 0.75), (0.75, 0.83, 0.88), (0.88, 0.94, 0.98))
 MIDDLE = 6.0  # mm: so far half a face goes beyond the middle
 WHOLE = 0.65  # share of a face that finds the scan, below which half of one is looked for as well
-PLAIN = 0.66  # relief from which on a first look is enough: faces have as much
+PLAIN = 0.66  # relief from which on a quick look is enough: faces have as much
 CLEAR = 0.75  # relief from which on nothing better is looked for
 
 

@@ -16,7 +16,7 @@ from ..scan.face_match import face_template, surface_samples
 from ..scan.flat_cuts import beyond
 from .confidence import like_ears
 from .infant import infant_points, infant_space
-from .looks import CLEAR, LOOKS, PARTS, PLAIN, WHOLE, templates_of
+from .looks import CLEAR, LOOKS, PARTS, PLAIN, QUICK, WHOLE, templates_of
 from .pose_search import LOOKING, Pose, search_poses
 from .shape_fit import LEAST, TRIAL, NoFaceError, ShapeFit, fit_shape
 from .shape_space import ShapeSpace
@@ -69,8 +69,8 @@ def place_face(mesh: Mesh, reference: Head, space: ShapeSpace, unit_scales) -> W
             continue
         best = min(seen, key=_by_likeness if look.infant else lambda t: t[0])
         verdict = best[0]
-        plain = verdict.likeness > PLAIN and share_of(space, best[2]) > WHOLE
-        if not verdict.doubtful and (plain or look is not LOOKS[0]):
+        enough = verdict.likeness > PLAIN and (look.half or share_of(space, best[2]) > WHOLE)
+        if not verdict.doubtful and (enough or look not in QUICK):
             if look.infant:
                 best = yield from portion(_or_turned_over(reference, best), high, 1.0)
             elif verdict.bad > ODD:
