@@ -176,6 +176,7 @@ def test_an_odd_face_may_be_an_infants(reference, space, monkeypatch, bad, asked
     monkeypatch.setattr(placed_face, "_trials", lambda *rest: work([(1.0, 1.0, None, None)]))
     monkeypatch.setattr(placed_face, "_fits", lambda *rest: work(found))
     monkeypatch.setattr(placed_face, "_or_infant", other)
+    monkeypatch.setattr(placed_face, "share_of", lambda *_: 1.0)
     _, fit, _, of = finish(placed_face.place_face(reference.skin, reference, space, (1.0,)))
     assert (fit, of.of_infants) == (("infant", True) if asked else ("grown", False))
 
@@ -258,8 +259,8 @@ def test_an_infant_is_found_in_any_turn_by_the_look_for_one(reference, monkeypat
         return with_mouth_in_place(space, target, fit)
 
     asked = []
-    monkeypatch.setattr(placed_face, "LOOKS", LOOKS[2:])
-    monkeypatch.setattr(placed_face, "PARTS", PARTS[2:])
+    monkeypatch.setattr(placed_face, "LOOKS", LOOKS[3:])
+    monkeypatch.setattr(placed_face, "PARTS", PARTS[3:])
     monkeypatch.setattr(find, "with_mouth_in_place", mouth)
     found = finish(find.find_landmarks(skin.moved(child(skin.vertices)), reference))
     truth = child(np.array([marks[n] for n in SKIN]))
