@@ -246,6 +246,19 @@ def test_of_half_a_face_the_eye_that_is_seen_tells(reference, seen_skin, sides):
         assert {"ps_r", "pi_r"} <= set(shown.lids) and not any(name.endswith("_l") for name in shown.lids)
 
 
+def test_along_an_eye_that_is_not_seen_no_crease_is_looked_for(reference, seen_skin, monkeypatch):
+    asked = []
+
+    def lines(*rest):
+        asked.append(rest[-1])
+        return lid_lines(*rest)
+
+    monkeypatch.setattr(expression, "lid_lines", lines)
+    target, space = right_half(seen_skin(BOTH)[0]), shape_space(reference)
+    _, shown = finish(fit_expression(space, target, finish(fit_shape(space, target, HERE))))
+    assert asked == ["r"] and set(shown.shut) == set(BOTH)
+
+
 def test_where_neither_eye_is_seen_both_are_looked_at(seen_skin):
     target, marks = seen_skin()
     brow = target.without(target.vertices[target.triangles][:, :, 2].min(axis=1) < marks["ps_l"][2] + 2)

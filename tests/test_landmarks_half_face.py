@@ -6,6 +6,7 @@ import pytest
 
 from headshop.sim.adapt.build import build_head
 from headshop.sim.adapt.closest import Surface
+from headshop.sim.adapt.landmarks import read_landmarks
 from headshop.sim.landmarks import looks, placed_face
 from headshop.sim.landmarks.find import find_landmarks
 from headshop.sim.landmarks.hidden_skin import WIDE, unseen_face, with_hidden_skin
@@ -16,8 +17,10 @@ from headshop.sim.landmarks.shape_space import MIRROR, shape_space
 from headshop.sim.landmarks.verdict import Verdict
 from headshop.sim.mesh import Mesh, vertex_normals
 from headshop.sim.progress import Progress, finish
+from headshop.sim.scan.clean import clean_scan
 from headshop.sim.scan.face_match import face_template
 from headshop.sim.scan.individual import draw_field
+from headshop.sim.scan.ply import read_ply
 
 SIDES = {"l": 1.0, "r": -1.0}
 BEYOND = 6.0  # mm beyond the middle at which a half ends
@@ -39,9 +42,9 @@ def somebody(reference):
     return reference.skin.moved(points), reference.landmarks.on(others | {"skin": points})
 
 
-def half_of(mesh: Mesh, side: str) -> Mesh:
-    """The ``side`` of a head, to a little beyond the middle."""
-    across = SIDES[side] * mesh.vertices[mesh.triangles][:, :, 0]
+def half_of(mesh: Mesh, side: str, middle=(0.0, 0.0, 0.0), way=(1.0, 0.0, 0.0)) -> Mesh:
+    """The ``side`` of a head to a little beyond its ``middle`` (3,), from which ``way`` (3,) leads to its left."""
+    across = SIDES[side] * (mesh.vertices[mesh.triangles] - middle) @ way / np.linalg.norm(way)
     return Mesh.from_triangles(mesh.vertices, mesh.triangles[across.min(axis=1) > -BEYOND])
 
 
@@ -87,12 +90,16 @@ def test_half_a_face_is_looked_for_as_either_half(reference):
             assert whole is template
 
 
-@pytest.mark.parametrize("side", "lr")
-def test_half_a_head_is_found(reference, somebody, side):
+@pytest.mark.parametrize(("who", "side"), [("somebody", "l"), ("s1", "l"), ("s1", "r")])
+def test_half_a_head_is_found(request, reference, somebody, who, side):
     mesh, true = somebody
+    if who == "s1":  # rough, with holes: no whole face fits on half of it
+        shared = request.getfixturevalue("shared")
+        mesh = clean_scan(read_ply(shared / "ict" / "examples" / "s1_scan.ply"))[0]
+        true = read_landmarks(shared / "ict" / "examples" / "s1_truth.json")
     turn = np.linalg.qr(np.random.default_rng(ord(side)).normal(size=(3, 3)))[0]
     turn *= np.sign(np.linalg.det(turn))
-    half = half_of(mesh, side)
+    half = half_of(mesh, side, (true["ex_l"] + true["ex_r"]) / 2, true["ex_l"] - true["ex_r"])
     found = finish(find_landmarks(Mesh.from_triangles(half.vertices @ turn.T, half.triangles), reference))
     off = {n: np.linalg.norm(found.positions[n] - true[n] @ turn.T) for n in found.positions if n in true}
     other = {"l": "r", "r": "l"}[side]
@@ -136,12 +143,14 @@ def test_half_a_face_is_looked_for_where_little_of_one_is_found(
 
 
 def test_what_a_scan_shows_on_the_other_side_only_is_filled_in(space):
-    left = space.points[:, 0] > BEYOND
+    left = space.points[:, 0] > -BEYOND
     fit = laid(space, space.points, None)
     hidden = unseen_face(space, fit, without(space, ~left))
     assert hidden.sum() > 100 and not hidden[left].any()
     assert (space.face[hidden] > 0.5).all()
     marks = space.landmarks(space.points)
+    beside = (space.points[:, 0] > -14) & (space.points[:, 0] < -10) & (space.face > 0.5)
+    assert hidden[beside].mean() > 0.5  # up to where the scan begins
     cheek = np.linalg.norm(space.points - (marks["zy_r"] + marks["ch_r"]) / 2, axis=1)
     assert hidden[(cheek < 20) & (space.face > 0.5) & (space.ear < 0.05)].all()
     assert not unseen_face(space, fit, without(space, cheek < WIDE - 3)).any()  # a small hole

@@ -230,3 +230,14 @@ def test_eyes_are_open_of_which_a_strip_in_the_shade_is_lost(reference, seen_ski
     fit = finish(fit_shape(space, target, Pose(1.0, np.eye(3), np.zeros(3), 0.0)))
     _, shown = finish(fit_expression(space, target.without(lost), fit))
     assert shown.shut == ()
+
+
+def test_one_eye_alone_tells_as_plainly_as_two(seen_skin, monkeypatch):
+    asked = []
+    monkeypatch.setattr(open_lids_module, "best_pair", lambda upper, lower: asked.append((upper, lower)))
+    target, marks = seen_skin()
+    for sides in ("lr", "l", "r"):
+        open_lids(marks, np.eye(3), target, None, sides)
+    both, left, right = np.array(asked)
+    np.testing.assert_allclose(both, (left + right) / 2)
+    assert np.abs(left).max() > 0.5
