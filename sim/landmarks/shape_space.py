@@ -24,7 +24,7 @@ from ..scan.individual import variation
 SCALES = ((90.0, 6.0, False), (45.0, 2.5, False), (24.0, 1.5, True))
 #: Correlation of left and right. Without it, the half of a face that a scan lacks was laid as in the likeliest face, whatever
 #: the other half is like.
-ALIKE = 0.95
+ALIKE = 0.9
 MIRROR = np.array([-1.0, 1.0, 1.0])
 #: mm by which the vertex of the likeliest head lies above the reference's, and above nasion in which that sets in. From n to v
 #: the reference has .82 of what it has from n to gn; ten heads (MakeHuman's, Lee Perry-Smith's, a mannequin's) and nine of
