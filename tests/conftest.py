@@ -106,6 +106,20 @@ def seen_skin(reference):
     return make
 
 
+@pytest.fixture(scope="session")
+def laid():
+    """``laid(space, points)`` -> the `ShapeFit` of a skin that has been laid at ``points`` (n, 3) mm, all of it trusted."""
+    from headshop.sim.landmarks.pose_search import Pose
+    from headshop.sim.landmarks.shape_fit import ShapeFit
+
+    def make(space, points):
+        n, modes = len(points), space.modes.shape[2]
+        pose = Pose(1.0, np.eye(3), np.zeros(3), 0.0)
+        return ShapeFit(points, np.zeros(modes), pose, np.ones(n), np.zeros(n), np.zeros((modes, modes)))
+
+    return make
+
+
 @pytest.fixture
 def bad_scan(tmp_path):
     """``bad_scan(kind)`` -> path of a file: empty, text, missing, truncated, points, nan, one_triangle, whole."""

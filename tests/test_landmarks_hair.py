@@ -217,13 +217,7 @@ def test_the_scalp_under_hair_is_invented_where_it_probably_is(reference, shaggy
     assert below.closest(places[face]).distance.mean() < 0.3
 
 
-def laid(space, points):
-    """The `ShapeFit` of a skin that lies where it ought to, at ``points`` (n, 3) mm."""
-    none = np.zeros(len(points))
-    return ShapeFit(points, none[:1], Pose(1.0, np.eye(3), none[:3], 0.0), none + 1, none, np.zeros((1, 1)))
-
-
-def test_ears_are_seen_where_they_are_expected(reference):
+def test_ears_are_seen_where_they_are_expected(reference, laid):
     space = shape_space(reference)
     fit, bare = laid(space, space.points), Surface(space.points, space.triangles)
     assert ear_found(space, fit, bare, "l") == ear_found(space, fit, bare, "r") == 1
@@ -264,7 +258,7 @@ def test_an_ear_under_hair_is_looked_for_below_it(reference, shaggy, one_ear):
     assert off["l"] < 10 and off["r"] < 4
 
 
-def test_the_face_is_no_hair(reference):
+def test_the_face_is_no_hair(reference, laid):
     space = shape_space(reference)
     marks = space.landmarks(space.points)
     inside = in_face(space, laid(space, space.points), {}, 3.0)
@@ -276,7 +270,7 @@ def test_the_face_is_no_hair(reference):
     assert lost.any() and space.points[lost, 2].mean() > marks["g"][2]
 
 
-def test_a_noisy_scan_of_a_bald_head_shows_no_hair(reference):
+def test_a_noisy_scan_of_a_bald_head_shows_no_hair(reference, laid):
     """Roughness counts only against that of the same scan's forehead."""
     space = shape_space(reference)
     scan, whole, _ = grown(reference, lambda points: 0.0)

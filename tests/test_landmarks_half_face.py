@@ -8,12 +8,11 @@ from headshop.sim.adapt.build import build_head
 from headshop.sim.adapt.closest import Surface
 from headshop.sim.adapt.landmarks import read_landmarks
 from headshop.sim.landmarks import looks, placed_face
+from headshop.sim.landmarks.both_sides import MIRROR
 from headshop.sim.landmarks.find import find_landmarks
 from headshop.sim.landmarks.hidden_skin import WIDE, unseen_face, with_hidden_skin
 from headshop.sim.landmarks.looks import LOOKS, PARTS, QUICK, WHOLE, templates_of
-from headshop.sim.landmarks.pose_search import Pose
-from headshop.sim.landmarks.shape_fit import ShapeFit
-from headshop.sim.landmarks.shape_space import MIRROR, shape_space
+from headshop.sim.landmarks.shape_space import shape_space
 from headshop.sim.landmarks.verdict import Verdict
 from headshop.sim.mesh import Mesh, vertex_normals
 from headshop.sim.progress import Progress, finish
@@ -46,13 +45,6 @@ def half_of(mesh: Mesh, side: str, middle=(0.0, 0.0, 0.0), way=(1.0, 0.0, 0.0)) 
     """The ``side`` of a head to a little beyond its ``middle`` (3,), from which ``way`` (3,) leads to its left."""
     across = SIDES[side] * (mesh.vertices[mesh.triangles] - middle) @ way / np.linalg.norm(way)
     return Mesh.from_triangles(mesh.vertices, mesh.triangles[across.min(axis=1) > -BEYOND])
-
-
-def laid(space, points, target):
-    """A `ShapeFit` that has the skin at ``points`` (n, 3) mm."""
-    n, modes = len(points), space.modes.shape[2]
-    pose = Pose(1.0, np.eye(3), np.zeros(3), 0.0)
-    return ShapeFit(points, np.zeros(modes), pose, np.ones(n), np.zeros(n), np.zeros((modes, modes)))
 
 
 def without(space, hole):
@@ -112,12 +104,10 @@ def test_half_a_head_is_found(request, reference, somebody, who, side):
     ("first", "share", "taken"),
     [
         (Verdict(False, 1.0, 0.9), WHOLE + 0.01, 1),
-        (
-            Verdict(False, 1.0, 0.9),
-            WHOLE - 0.01,
-            2,
-        ),  # laid on half a face, it need not be in its place, however plain it is
-        (Verdict(False, 1.0, 0.56), WHOLE + 0.01, 3),  # hardly like a face, it waits for a thorough look all the same
+        # laid on half a face, it need not be in its place, however plain it is
+        (Verdict(False, 1.0, 0.9), WHOLE - 0.01, 2),
+        # hardly like a face, it waits for a thorough look all the same
+        (Verdict(False, 1.0, 0.56), WHOLE + 0.01, 3),
     ],
 )
 def test_half_a_face_is_looked_for_where_little_of_one_is_found(
@@ -142,9 +132,9 @@ def test_half_a_face_is_looked_for_where_little_of_one_is_found(
     assert [look.half for look in LOOKS[:2]] == [False, True]
 
 
-def test_what_a_scan_shows_on_the_other_side_only_is_filled_in(space):
+def test_what_a_scan_shows_on_the_other_side_only_is_filled_in(space, laid):
     left = space.points[:, 0] > -BEYOND
-    fit = laid(space, space.points, None)
+    fit = laid(space, space.points)
     hidden = unseen_face(space, fit, without(space, ~left))
     assert hidden.sum() > 100 and not hidden[space.points[:, 0] > 0].any()
     assert (space.face[hidden] > 0.5).all()
@@ -159,8 +149,8 @@ def test_what_a_scan_shows_on_the_other_side_only_is_filled_in(space):
     assert not unseen_face(space, fit, without(space, both))[both].any()  # nothing tells
 
 
-def test_skin_near_a_place_that_is_known_is_not_filled_in(space):
-    fit, target = laid(space, space.points, None), without(space, space.points[:, 0] < -BEYOND)
+def test_skin_near_a_place_that_is_known_is_not_filled_in(space, laid):
+    fit, target = laid(space, space.points), without(space, space.points[:, 0] < -BEYOND)
     known = space.landmarks(space.points)["ch_r"]
     near = np.linalg.norm(space.points - known, axis=1) < 18
     assert unseen_face(space, fit, target)[near].any()
@@ -168,7 +158,7 @@ def test_skin_near_a_place_that_is_known_is_not_filled_in(space):
     assert kept.any() and not kept[near].any()
 
 
-def test_the_other_side_is_filled_in_as_this_one_is(space):
+def test_the_other_side_is_filled_in_as_this_one_is(space, laid):
     """A cheek that is fuller than the likeliest head's is so on the side that the scan lacks, too."""
     normals = vertex_normals(space.points, space.triangles)
     marks = space.landmarks(space.points)
@@ -177,7 +167,7 @@ def test_the_other_side_is_filled_in_as_this_one_is(space):
         for s in SIDES
     )
     person = space.points + full[:, None] * normals
-    fit = laid(space, space.points, None)
+    fit = laid(space, space.points)
     shown = person[:, 0] > -BEYOND
     scan = Surface(person, space.triangles[shown[space.triangles].all(axis=1)])
     hidden = unseen_face(space, fit, scan)

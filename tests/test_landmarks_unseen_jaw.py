@@ -16,8 +16,6 @@ from headshop.sim.landmarks.confidence import support
 from headshop.sim.landmarks.find import find_landmarks
 from headshop.sim.landmarks.first_look import first_look
 from headshop.sim.landmarks.placed_face import run
-from headshop.sim.landmarks.pose_search import Pose
-from headshop.sim.landmarks.shape_fit import ShapeFit
 from headshop.sim.landmarks.shape_space import shape_space
 from headshop.sim.landmarks.unseen_jaw import PULLED_UP, below_lips, lip_to_chin, with_unseen_jaw
 from headshop.sim.mesh import Mesh
@@ -45,13 +43,6 @@ def _above(mesh: Mesh, height: float) -> Mesh:
     )
 
 
-def _laid(space, shaped):
-    """A `ShapeFit` that has laid the skin as it is ``shaped`` (n, 3) mm."""
-    n, modes = len(shaped), space.modes.shape[2]
-    pose = Pose(1.0, np.eye(3), np.zeros(3), 0.0)
-    return ShapeFit(shaped, np.zeros(modes), pose, np.ones(n), np.zeros(n), np.zeros((modes, modes)))
-
-
 def _pulled_up(space, share):
     """The skin (n, 3) mm with lower lip and chin so near to the upper lip that ``share`` of the way from ls to sl is left."""
     marks = space.landmarks(space.points)
@@ -74,20 +65,20 @@ def test_the_chin_that_a_scan_lacks_is_where_the_rest_lets_expect_it(reference, 
 
 
 @pytest.mark.parametrize("share", [0.5, PULLED_UP - 0.03, PULLED_UP + 0.03, 1.0])
-def test_a_jaw_that_is_pulled_up_is_laid_without_looking_for_it(reference, monkeypatch, share):
+def test_a_jaw_that_is_pulled_up_is_laid_without_looking_for_it(reference, monkeypatch, share, laid):
     space = shape_space(reference)
     marks = space.landmarks(space.points)
     scan = _above(Mesh.from_triangles(space.points, space.triangles), marks["sto"][2])
-    pulled = _laid(space, _pulled_up(space, share))
+    pulled = laid(space, _pulled_up(space, share))
     asked = []
 
     def begun_again(blind, target, fit, size):
         asked.append(blind)
         yield 1.0
-        return _laid(space, space.points)
+        return laid(space, space.points)
 
     monkeypatch.setattr(unseen_jaw, "begun_again", begun_again)
-    assert lip_to_chin(space, pulled) / lip_to_chin(space, _laid(space, space.points)) == pytest.approx(share, abs=0.01)
+    assert lip_to_chin(space, pulled) / lip_to_chin(space, laid(space, space.points)) == pytest.approx(share, abs=0.01)
     fit, left = finish(run(with_unseen_jaw(space, Surface(scan.vertices, scan.triangles), pulled), 0.0, 1.0, ""))
     low = below_lips(space)
     assert (asked[0].area[low] == 0).all() and (asked[0].area[~low] == space.area[~low]).all()
@@ -97,10 +88,10 @@ def test_a_jaw_that_is_pulled_up_is_laid_without_looking_for_it(reference, monke
         assert fit is pulled and left is space
 
 
-def test_a_chin_that_is_seen_is_looked_for(reference, monkeypatch):
+def test_a_chin_that_is_seen_is_looked_for(reference, monkeypatch, laid):
     space = shape_space(reference)
     monkeypatch.setattr(unseen_jaw, "begun_again", None)
-    fit = _laid(space, space.points)
+    fit = laid(space, space.points)
     work = with_unseen_jaw(space, Surface(space.points, space.triangles), fit)
     assert finish(run(work, 0.0, 1.0, "")) == (fit, space)
 
@@ -114,9 +105,9 @@ def test_what_lies_below_the_lips(reference):
     assert not low[[at[n] for n in ("ls", "sn", "prn", "cph_l", "go_l", "go_r", "t_l", "sba_r")]].any()
 
 
-def test_skin_that_does_not_count_is_no_support(reference):
+def test_skin_that_does_not_count_is_no_support(reference, laid):
     space = shape_space(reference)
-    shares = support(replace(space, area=np.where(below_lips(space), 0.0, space.area)), _laid(space, space.points))
+    shares = support(replace(space, area=np.where(below_lips(space), 0.0, space.area)), laid(space, space.points))
     assert shares["pg"] == 0 and shares["prn"] == 1
 
 

@@ -8,12 +8,12 @@ How far the scan stands off that head is taken for a Gaussian process on the ref
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 from scipy.spatial import cKDTree
-from scipy.spatial.distance import cdist
 
 from ..adapt.closest import Surface
 from ..mesh import vertex_normals
+from .both_sides import MIRROR, alike
 from .shape_fit import ShapeFit, pairs
-from .shape_space import MIRROR, ShapeSpace
+from .shape_space import ShapeSpace
 
 BEHIND, SEEN = 9.0, 3.0  # mm to which a thing hides skin behind it; from which on skin is not seen
 #: mm from an unseen part of the face to the scan, at least, as smaller holes are spanned well enough; from there to what is
@@ -79,17 +79,8 @@ def with_hidden_skin(space: ShapeSpace, fit: ShapeFit, hidden, left: Surface, he
     near |= cKDTree(space.points[used]).query(space.points)[0] < about
     known = np.flatnonzero(near & (trust > TRUSTED) & (space.ear < EARLESS))
     off = np.einsum("ij,ij->i", place[known] - fit.points[known], normals[known])
-    system = _alike(space.points[known], space.points[known], together)
+    system = alike(space.points[known], space.points[known], together, ALIKE)
     system[np.diag_indices_from(system)] += (ROUGH / spread) ** 2
-    out = _alike(space.points[used], space.points[known], together) @ cho_solve(cho_factor(system), off)
+    out = alike(space.points[used], space.points[known], together, ALIKE) @ cho_solve(cho_factor(system), off)
     points = fit.points[used] + out[:, None] * normals[used]
     return left.beside(points, corners.reshape(-1, 3))
-
-
-def _alike(a, b, together):
-    """(j, k) covariance between points (j, 3) and (k, 3) mm, as a share of the variance, that go ``together`` so far (mm)."""
-
-    def near(c):
-        return np.exp(-cdist(a, c, "sqeuclidean") / (2 * together**2))
-
-    return near(b) + ALIKE * near(b * MIRROR)

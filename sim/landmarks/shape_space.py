@@ -19,13 +19,13 @@ from ..anatomy.landmark_names import SKIN
 from ..mesh_subdivision import drawn
 from ..relax.responses import answers, responses
 from ..scan.individual import variation
+from .both_sides import MIRROR, alike, near
 
 #: Smooth displacements: reach in mm, standard deviation in mm, whether for the face only.
 SCALES = ((90.0, 6.0, False), (45.0, 2.5, False), (24.0, 1.5, True))
 #: Correlation of left and right. Without it, the half of a face that a scan lacks was laid as in the likeliest face, whatever
 #: the other half is like.
 ALIKE = 0.9
-MIRROR = np.array([-1.0, 1.0, 1.0])
 #: mm by which the vertex of the likeliest head lies above the reference's, and above nasion in which that sets in. From n to v
 #: the reference has .82 of what it has from n to gn; ten heads (MakeHuman's, Lee Perry-Smith's, a mannequin's) and nine of
 #: ICT-FaceKit's have .83 to 1.04, .91 on average. With the reference's, crowns that no scan shows were too low on nearly all.
@@ -204,20 +204,19 @@ def _smooth(points, reach, sd, where=None):
     centres = places[farthest(places, reach)]
     out = np.zeros((len(points), 3, 3 * len(centres)))
     for axis, sign in enumerate(MIRROR):
-        root = cholesky(_alike(centres, centres, reach, sign) + 1e-4 * np.eye(len(centres)), lower=True)
-        out[:, axis, axis::3] = sd * solve_triangular(root, _alike(centres, points, reach, sign), lower=True).T
+        root = cholesky(_together(centres, centres, reach, sign) + 1e-4 * np.eye(len(centres)), lower=True)
+        out[:, axis, axis::3] = sd * solve_triangular(root, _together(centres, points, reach, sign), lower=True).T
     return out
 
 
-def _alike(a, b, reach, sign):
+def _together(a, b, reach, sign):
     """(j, k) covariance, as a share of the variance, of displacements at ``a`` (j, 3) and ``b`` (k, 3) mm along an axis that
     has that ``sign`` in a mirror. Across the middle (sign -1) those of the middle itself vary little."""
 
     def deviation(points):
         return np.sqrt(1 + max(sign, 0) * ALIKE * np.exp(-2 * points[:, 0] ** 2 / reach**2))
 
-    both = _gauss(a, b, reach) + sign * ALIKE * _gauss(a, b * MIRROR, reach)
-    return both / np.outer(deviation(a), deviation(b))
+    return alike(a, b, reach, sign * ALIKE) / np.outer(deviation(a), deviation(b))
 
 
 def farthest(points: np.ndarray, spacing: float) -> np.ndarray:
@@ -228,11 +227,6 @@ def farthest(points: np.ndarray, spacing: float) -> np.ndarray:
         chosen.append(int(distance.argmax()))
         distance = np.minimum(distance, np.linalg.norm(points - points[chosen[-1]], axis=1))
     return np.array(chosen)
-
-
-def _gauss(a, b, reach):
-    apart = np.maximum((a * a).sum(axis=1)[:, None] + (b * b).sum(axis=1) - 2 * a @ b.T, 0)
-    return np.exp(-apart / (2 * reach**2))
 
 
 def _jaw(points, jaw, head):
@@ -255,7 +249,7 @@ def _smile(points, landmarks):
     """The mode (n, 3, 1) of both corners of the mouth drawn outward, back and up."""
     out, back, up = SMILE
     moved = sum(
-        _gauss(points, landmarks[name][None], SMILE_REACH) * np.array([side * out, back, up])
+        near(points, landmarks[name][None], SMILE_REACH) * np.array([side * out, back, up])
         for name, side in (("ch_l", 1.0), ("ch_r", -1.0))
     )
     return moved[:, :, None]
