@@ -62,12 +62,11 @@ def measured(head: ScannedHead, mode: str, output: Path, folder: Path, further: 
     if done.returncode:
         return done.stderr.strip().splitlines()[-1]
     command = [sys.executable, folder / "eval" / "fit_quality.py"]
-    if head.smiles:
-        command += [as_neutral(head, out), head.truth, "--truth-landmarks", head.landmarks_of_truth]
-    else:
-        command += [out, head.scan]
-        if head.truth is not None:
-            command += ["--truth-surface", head.truth, "--truth-landmarks", head.landmarks_of_truth]
+    command += [as_neutral(head, out), head.truth] if head.smiles else [out, head.scan]
+    if head.truth is not None and not head.smiles:
+        command += ["--truth-surface", head.truth]
+    known = head.landmarks_of_truth or head.landmarks
+    command += [] if known is None else ["--truth-landmarks", known]
     found = subprocess.run(command, capture_output=True, text=True, check=True).stdout
     answer.write_text(found)
     return json.loads(found)

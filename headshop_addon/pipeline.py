@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 
 from ..sim.adapt.build import build_head
-from ..sim.anatomy.storage import load_head
+from ..sim.anatomy.storage import reference_head
 from ..sim.detail.maps import SIZE
 from ..sim.landmarks.find import find_landmarks
 from ..sim.mesh import Mesh
@@ -131,7 +131,7 @@ def build(
     seconds = dict(scan.seconds)
     with timed(seconds, "fit"):
         yield Progress(0.0, "Reading the reference head")
-        reference = load_head()
+        reference = reference_head()
         work = build_head(reference, scan.mesh, landmarks, detail, relax, leave_out, found)
         result = yield from portion(work, 0.02, 0.9)
     yield Progress(0.9, "Placing the head")

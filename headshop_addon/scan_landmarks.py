@@ -137,9 +137,9 @@ def _follow_found(scan, placed) -> None:
 
 def _completed(given: dict) -> dict:
     from ..sim.adapt.completion import complete_landmarks
-    from ..sim.anatomy.storage import load_head
+    from ..sim.anatomy.storage import reference_head
 
-    return complete_landmarks(load_head(), given)
+    return complete_landmarks(reference_head(), given)
 
 
 def _on_a_line(given: dict) -> bool:

@@ -83,7 +83,7 @@ def reference():
 
     if not storage.REFERENCE.is_file():
         pytest.skip(f"no {storage.REFERENCE.name}: run python -m headshop.assets.generators.make_reference_head")
-    return storage.load_head()
+    return storage.reference_head()
 
 
 @pytest.fixture(scope="session")

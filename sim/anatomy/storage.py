@@ -9,6 +9,7 @@ import io
 import json
 import os
 import tempfile
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -168,6 +169,18 @@ def save_head(head: Head, path) -> None:
     stream = io.BytesIO()
     np.savez_compressed(stream, **arrays)
     write_atomically(path, stream.getvalue())
+
+
+@cache
+def reference_head() -> Head:
+    """The reference head, read once, for what is worked out from a head is kept with it (`sim.adapt.rest`, `shape_space`).
+
+    Its meshes and groups cannot be written to: all who ask have the same ones.
+    """
+    head = load_head()
+    for array in (*head.groups.values(), *(a for mesh in head.parts.values() for a in (mesh.vertices, mesh.faces))):
+        array.flags.writeable = False
+    return head
 
 
 def load_head(path=REFERENCE) -> Head:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..anatomy.head import Head
-from ..anatomy.storage import load_head
+from ..anatomy.storage import reference_head
 from ..cylindrical.second_opinion import weighed
 from ..mesh import Mesh
 from ..progress import Progress, Work, portion
@@ -73,7 +73,7 @@ def find_landmarks(mesh: Mesh, reference: Head | None = None, unit_scales=(1.0,)
     InputError : there is no face in it.
     """
     yield Progress(0.0, LOOKING)
-    reference = reference or load_head()
+    reference = reference or reference_head()
     space = shape_space(reference)
     jumps = depth_jumps(mesh.vertices, mesh.triangles)
     mesh = Mesh.from_triangles(mesh.vertices, mesh.triangles[~jumps]) if jumps.any() else mesh

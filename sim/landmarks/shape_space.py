@@ -8,6 +8,7 @@ departs from rest most, an open jaw and a smile. Its mean is the reference with 
 """
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular
@@ -111,8 +112,9 @@ class ShapeSpace:
         return dict(zip(self.names, at, strict=True))
 
 
+@lru_cache(maxsize=2)
 def shape_space(head: Head) -> ShapeSpace:
-    """The shape space of a head at rest."""
+    """The shape space of a head at rest, made once."""
     skin = head.skin
     whole = drawn(skin.faces, skin.vertices)
     inner = head.groups["inner"] > 0.5

@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 
 from ..acting.arkit import mirrored
 from ..anatomy.head import Head
-from ..anatomy.storage import load_head
+from ..anatomy.storage import reference_head
 from .inputs import input_names
 
 
@@ -39,7 +39,7 @@ class Seen:
 
 def opposite_vertices(head: Head) -> np.ndarray | None:
     """(n,) for each skin vertex the one that is its mirror image on the reference head; None for another mesh."""
-    reference = load_head().skin
+    reference = reference_head().skin
     if reference.faces.shape != head.skin.faces.shape or (reference.faces != head.skin.faces).any():
         return None
     return cKDTree(reference.vertices).query(reference.vertices * (-1, 1, 1))[1]

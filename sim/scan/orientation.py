@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..anatomy.head import Head
-from ..anatomy.storage import load_head
+from ..anatomy.storage import reference_head
 from ..errors import InputError
 from ..mesh import Mesh
 from .face_match import best_turns, face_template, surface_samples
@@ -84,7 +84,7 @@ def detect(
     ------
     InputError : no unit makes the scan as large as a head, or an override is not understood.
     """
-    reference = reference or load_head()
+    reference = reference or reference_head()
     allowed = _allowed(up, front)
     points = surface_samples(mesh)
     units = _units(points, unit)

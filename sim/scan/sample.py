@@ -12,7 +12,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..anatomy.head import Head, moved_muscles_and_jaw
-from ..anatomy.storage import load_head, write_atomically
+from ..anatomy.storage import reference_head, write_atomically
 from ..errors import InputError
 from ..mesh import Mesh, vertex_normals
 from ..mesh_subdivision import smoother
@@ -67,7 +67,7 @@ def make_sample(
     """
     rng = np.random.default_rng([seed, 0x5EED])
     yield Progress(0.0, "Making a person")
-    reference = reference or load_head()
+    reference = reference or reference_head()
     person = individual(reference, rng)
     yield Progress(0.1, "Smoothing the skin")
     surface, inner, ears = _smooth(person, reference, levels, rng)
