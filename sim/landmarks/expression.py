@@ -8,6 +8,7 @@ from ..adapt.closest import Surface
 from ..adapt.lid_line import PLAIN, LidLine
 from ..relax.mouth_gap import lip_edges
 from ..relax.upper_teeth import incisal_edge
+from .blank_eyes import blank_eyes
 from .eye_gaps import EyeGaps, eyes_shown, gaps_in_eyes
 from .eye_sockets import socket_corners
 from .eyeballs_seen import eyeballs_seen
@@ -86,7 +87,7 @@ def _fit_lids(space, target, fit, parted, told):
     gaps = gaps_in_eyes(*laid, sides)
     eyeballs = eyeballs_seen(*laid)
     known_open = gaps.show_open or bool(eyeballs) or bool(corners)
-    seen = corners | open_lids(*laid, eyeballs, sides) if known_open else {}
+    seen = corners | open_lids(*laid, eyeballs, sides) if known_open else blank_eyes(*laid, sides)
     if seen:
         lids = told_of_open_lids(space, fit, seen)
         return (yield from changed(Expression(parted), fit.coefficients, lids)), Expression(parted, lids=seen)
