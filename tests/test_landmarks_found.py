@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.spatial import ConvexHull
 
 from headshop.sim.adapt.closest import Surface
 from headshop.sim.adapt.landmarks import read_landmarks
@@ -253,6 +254,13 @@ def test_where_there_are_only_flat_ends_no_face_is_found(reference):
     box = Mesh(np.concatenate(sides) * [75.0, 90.0, 120.0], np.concatenate([quads + 625 * k for k in range(6)]))
     with pytest.raises(InputError, match="No face is found"):
         finish(find_landmarks(box, reference))
+
+
+def test_a_ball_is_no_face_however_thorough_the_look(reference):
+    points = np.random.default_rng(0).standard_normal((900, 3))
+    points *= 110 / np.linalg.norm(points, axis=1, keepdims=True)
+    with pytest.raises(InputError, match="No face is found"):
+        finish(find_landmarks(Mesh.from_triangles(points, ConvexHull(points).simplices), reference))
 
 
 def test_a_crop_from_brows_to_lips_is_a_face(person, outside, reference):

@@ -62,15 +62,13 @@ def test_the_back_of_the_head_is_no_wall(depth_map, reference):
     assert {"op", "v"} <= set(found.mid_air) | set(found.missing)
     assert np.mean([np.linalg.norm(found.positions[n] - marks[n]) for n in ("prn", "en_l", "ch_r", "gn", "sn")]) < 2.5
     given = {n: marks[n] for n in SKIN if n in marks and n not in ("v", "op")}
-    kinds = ("auto", "never", "depth_jumps", "flat_ends,held_by_lips,hair")
-    built = {keep: finish(build_head(reference, mesh, given, detail=0, leave_out=keep)) for keep in kinds}
+    others = "flat_ends,held_by_lips,hair"
+    built = {keep: finish(build_head(reference, mesh, given, detail=0, leave_out=keep)) for keep in ("auto", others)}
     off = {
         keep: np.linalg.norm(head.head.skin.vertices - reference.skin.vertices, axis=1)[reference.groups["scalp"] > 0.5]
         for keep, head in built.items()
     }
-    assert np.percentile(off["auto"], 95) < 12.0 < np.percentile(off["never"], 95)
-    left = built["auto"].fit["left_out_mm2"]
-    assert left["depth_jumps"] > 10_000 and built["never"].fit["left_out_mm2"]["depth_jumps"] == 0
-    alone, others = (built[keep].fit["left_out_mm2"] for keep in kinds[2:])
-    assert alone["depth_jumps"] == left["depth_jumps"] and others["depth_jumps"] == 0
+    assert np.percentile(off["auto"], 95) < 12.0 < np.percentile(off[others], 95)
+    assert built["auto"].fit["left_out_mm2"]["depth_jumps"] > 10_000
+    assert built[others].fit["left_out_mm2"]["depth_jumps"] == 0
     assert "left out: what is stretched over the jumps of a depth map" in built["auto"].fit["sentence"]

@@ -34,12 +34,13 @@ BOUNDS = ((-5, 5), (-5, 5), (-6, 7), (-3, 3), (-6, 3), (5, 14))
 #: How plain both margins of a blank eye are, 0..1, and how steep against what lies between them. On 14 scans of blank eyes .75
 #: and more, 1.7 and more; on none of 14 others both: lids with folds are as plain, 1.2 times as steep.
 PLAIN, SMOOTHER = 0.7, 1.5
-#: mm above the outline that people pick the margins, and the corners (of which it tells the height alone).
-ABOVE = {"en": 0.0, "ex": 1.0, "ps": 0.0, "pi": 0.0}
+#: mm above the outline that people pick the margins, and the outer corner (of which it tells the height alone). The inner one
+#: lies beyond it, and is found better without.
+ABOVE = {"ex": 1.0, "ps": 0.0, "pi": 0.0}
 
 
 def blank_eyes(marks, matrix, target: Surface, sides: str = "lr") -> dict[str, np.ndarray]:
-    """Name -> (3,) mm: ``en``, ``ex``, ``ps`` and ``pi`` of the eyes on these ``sides`` if all of them are blank; else nothing.
+    """Name -> (3,) mm: ``ex``, ``ps`` and ``pi`` of the eyes on these ``sides`` if all of them are blank; else nothing.
 
     marks : name -> (3,) mm, about where ``en`` and ``ex`` lie; matrix (3, 3) turns and scales the reference into the scan
     """
