@@ -2,7 +2,7 @@
 """How well `headshop build` fits each scanned head of the test data: with the landmarks found, with those given, with twelve.
 
     python benchmarks/fit_table.py -o out/fit                        # everything, which takes most of an hour
-    python benchmarks/fit_table.py -o out/fit --modes found lps ct   # some: names that contain one of these
+    python benchmarks/fit_table.py lps ct -o out/fit --modes found   # some: names that contain one of these
 
 Measured by the test data's ``eval/fit_quality.py``, which see for the definitions; smiles against the same person's neutral
 face, in the place of the scan. What is built already is not built again: a run that was cut off goes on. Millimetres, mean /

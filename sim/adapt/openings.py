@@ -10,10 +10,15 @@ from scipy.sparse import coo_matrix
 
 from ..anatomy.head import Head
 from ..mesh import edges
+from .closest import Surface
 from .fine_fit import Anchors
 
 TOGETHER = 3.0  # weight of a pair of rim points, against 1 for a point of data
 CLOSED = 0.3  # opening of the lids against the reference's below which an eye counts as closed
+LIDS = ("upper", "lower")
+#: mm inside the margins of lids, and before and behind, of what lies between them, and shares of the way from either corner up
+#: to which all is left: there lids and eyeball are not told apart.
+WITHIN, BALL, CORNER = 0.7, 12.0, 0.25
 SHUT = 1.2  # mm: lips and margins of lids this close on the reference lie on each other
 
 
@@ -121,6 +126,35 @@ def lid_margins(reference: Head, rim, given, matrix, closed=(), lines=None):
     if not rows:
         return np.zeros(0, dtype=int), np.zeros((0, 3)), np.zeros(0)
     return np.concatenate(rows), np.concatenate(targets), np.concatenate(changes)
+
+
+def between_lids(surface: Surface, reference: Head, given, matrix, margins, places) -> np.ndarray:
+    """(t,) bool: the triangles of ``surface`` that lie between the margins of open lids, so on an eyeball and no skin.
+
+    matrix (3, 3) turns the reference into the scan's place; margins (k,), places (k, 3) mm : as `lid_margins` has them
+    """
+    out = np.zeros(len(surface.triangles), dtype=bool)
+    middle = surface.vertices[surface.triangles].mean(axis=1)
+    for side in ("l", "r"):
+        lids = [np.isin(margins, np.flatnonzero(np.asarray(reference.groups[f"lid_{x}_{side}"]) > 0.5)) for x in LIDS]
+        if min(on.sum() for on in lids) < 3:
+            continue
+        corners = given[f"en_{side}"], given[f"ex_{side}"]
+        frame, scale = _eye_frame(*corners, matrix[:, 2]), np.cbrt(np.linalg.det(matrix))
+        local = (middle - corners[0]) @ frame.T
+        upper, lower = (_along((places[on] - corners[0]) @ frame.T, local[:, 0]) for on in lids)
+        depth = local[:, 2] - (upper[1] + lower[1]) / 2
+        share = local[:, 0] / np.linalg.norm(corners[1] - corners[0])
+        inside = (local[:, 1] < upper[0] - WITHIN * scale) & (local[:, 1] > lower[0] + WITHIN * scale)
+        inside &= (share > CORNER) & (share < 1 - CORNER)
+        out |= inside & (np.abs(depth) < BALL * scale)
+    return out
+
+
+def _along(margin, x):
+    """Height and depth (2, t) of a ``margin`` (k, 3) in the frame of its eye, at ``x`` (t,); NaN beside it."""
+    order = np.argsort(margin[:, 0], kind="stable")
+    return np.array([np.interp(x, margin[order, 0], margin[order, k], np.nan, np.nan) for k in (1, 2)])
 
 
 def _seam(reference, rim, side, start, frame, along):

@@ -18,7 +18,7 @@ from .completion import complete_positions, mirror_plane, sigma
 from .ears import EAR_MARKS, ear_sheets, unseen_ears
 from .fine_fit import Anchors, Fitted, fine_fit
 from .lid_line import met_at
-from .openings import closed_eyes, lid_margins, offset_anchors, rim_anchors, rims
+from .openings import between_lids, closed_eyes, lid_margins, offset_anchors, rim_anchors, rims
 from .refine import Pairs, refine
 from .shut_eyes import with_shut_eyes
 from .skin_groups import group
@@ -126,6 +126,7 @@ def _fitting(
     turn, shift = similarity(marks, goal)
     lines = {side: met_at(given, side, target, turn) for side in closed}
     margin, margin_goal, change = lid_margins(reference, rim, given, turn, closed, lines)
+    data = data.without(between_lids(data, reference, given, turn, margin, margin_goal))
     pinched = change.max(initial=0.0)
     give[np.isin(names, LID_MARKS) & known] += CARRIED * pinched
     margin, margin_goal = np.concatenate([margin, lips[0]]), np.concatenate([margin_goal, lips[1]])
@@ -138,9 +139,7 @@ def _fitting(
     moved = first.transform(skin.vertices)
     used = np.unique(outer)[::4]  # enough to tell
     if data.inside_out(moved[used], vertex_normals(moved, outer)[used], 20.0):
-        same = data is target
-        target = target.turned()
-        data = target if same else data.turned()
+        target, data = target.turned(), data.turned()
     # Landmarks that were not given are where the skin is now; data will move them.
     now = np.concatenate([rows @ moved, moved[margin]])
     aim[: len(names)] = np.where(known[:, None], goal, now[: len(names)])
