@@ -23,6 +23,7 @@ from headshop.sim.scan.ply import read_ply, write_ply
 
 MODES = ("found", "given", "twelve")
 CORNERS = ("ch_l", "ch_r")
+TITLES = ("skin to scan", "scan to skin", "to truth", "truth to skin", "in holes", "whole head", "lm / corner")
 
 
 def main():
@@ -31,9 +32,6 @@ def main():
     parser.add_argument("names", nargs="*", help="heads whose name contains one of these (default: all)")
     parser.add_argument("-o", "--output", type=Path, required=True, help="folder of what is built and measured")
     parser.add_argument("--modes", nargs="+", choices=MODES, default=MODES)
-    parser.add_argument(
-        "--build", nargs=argparse.REMAINDER, default=[], help="last: further arguments of headshop build"
-    )
     args = parser.parse_args()
     folder = test_data()
     print(f"{'head':26}{'landmarks':10}" + "".join(f"{title:>13}" for title in TITLES) + "  mesh, bone")
@@ -42,12 +40,10 @@ def main():
             continue
         for mode in args.modes:
             if mode == "found" or head.landmarks is not None:
-                print(
-                    f"{head.name:26}{mode:10}" + row(measured(head, mode, args.output, folder, args.build)), flush=True
-                )
+                print(f"{head.name:26}{mode:10}" + row(measured(head, mode, args.output, folder)), flush=True)
 
 
-def measured(head: ScannedHead, mode: str, output: Path, folder: Path, further: list[str]) -> dict | str:
+def measured(head: ScannedHead, mode: str, output: Path, folder: Path) -> dict | str:
     """What the script says of ``head``, built with the landmarks of ``mode``, or why it could not be built."""
     out = output / f"{head.name}_{mode}"
     answer = out.with_suffix(".json")
@@ -55,7 +51,7 @@ def measured(head: ScannedHead, mode: str, output: Path, folder: Path, further: 
         return json.loads(answer.read_text())
     out.parent.mkdir(parents=True, exist_ok=True)
     command = [sys.executable, "-m", "headshop", "build", head.scan, "--detail", "0", "--quiet", "--export", out]
-    command += ["-o", out.with_suffix(".blend"), *further]
+    command += ["-o", out.with_suffix(".blend")]
     if mode != "found":
         command += ["--landmarks", landmarks_of(head, mode, out)]
     done = subprocess.run(command, capture_output=True, text=True)
@@ -101,9 +97,6 @@ def as_neutral(head: ScannedHead, out: Path) -> Path:
     }
     (moved / "landmarks.json").write_text(json.dumps(known))
     return moved
-
-
-TITLES = ("skin to scan", "scan to skin", "to truth", "truth to skin", "in holes", "whole head", "lm / corner")
 
 
 def row(found: dict | str) -> str:

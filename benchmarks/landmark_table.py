@@ -5,8 +5,7 @@
     python benchmarks/landmark_table.py -o out/landmarks lps ct   # those whose name contains one of these
 
 Distances to the known landmarks, weighed by one over the square of their ``sigma_mm`` where the file has it. Face: without
-those of the ears, the scalp and the angle of the jaw. What is found already is not looked
-for again. Millimetres.
+those of the ears, the scalp and the angle of the jaw. What is found already is not looked for again. Millimetres.
 """
 
 import argparse

@@ -121,6 +121,15 @@ def laid():
 
 
 @pytest.fixture
+def one_look(monkeypatch):
+    """Faces are looked for once, quickly, so that a scan without any is soon refused."""
+    from headshop.sim.landmarks import looks, placed_face
+
+    monkeypatch.setattr(placed_face, "LOOKS", looks.LOOKS[:1])
+    monkeypatch.setattr(placed_face, "PARTS", looks.PARTS[:1])
+
+
+@pytest.fixture
 def bad_scan(tmp_path):
     """``bad_scan(kind)`` -> path of a file: empty, text, missing, truncated, points, nan, one_triangle, whole."""
     import numpy as np

@@ -12,7 +12,8 @@ from headshop.assets.generators.steps import rounded
 from headshop.sim.anatomy.eyeball import reach
 from headshop.sim.anatomy.head import PARTS, SKIN_GROUPS
 from headshop.sim.anatomy.landmark_names import SKIN, SKULL, mirrored
-from headshop.sim.anatomy.storage import load_head
+from headshop.sim.anatomy.storage import load_head, reference_head
+from headshop.sim.landmarks.shape_space import shape_space
 from headshop.sim.mesh import edges, vertex_normals
 from headshop.sim.mesh_subdivision import drawn, subdivision
 
@@ -297,3 +298,12 @@ def test_the_skin_is_remade_from_its_tables(head):
     np.testing.assert_array_equal(skin.landmarks.corners, head.landmarks.corners)
     for name, weights in skin.groups.items():
         np.testing.assert_allclose(weights, head.groups[name], atol=1e-5, err_msg=name)
+
+
+def test_all_who_ask_for_the_reference_head_have_the_same_one_and_cannot_change_it(head):
+    ours = reference_head()
+    assert ours is reference_head() and shape_space(ours) is shape_space(ours)
+    for name, mesh in ours.parts.items():
+        np.testing.assert_array_equal(mesh.vertices, head.parts[name].vertices)
+        with pytest.raises(ValueError, match="read-only"):
+            mesh.vertices[0] = 0

@@ -14,8 +14,6 @@ from scipy.spatial import ConvexHull
 
 from headshop.headshop_addon.command_line import main
 from headshop.sim.anatomy.head import Head
-from headshop.sim.landmarks import placed_face
-from headshop.sim.landmarks.looks import LOOKS, PARTS
 from headshop.sim.mesh import Mesh
 from headshop.sim.scan.ply import write_ply
 
@@ -90,9 +88,7 @@ def test_no_landmark_file_there(capfd, tmp_path, scan):
     assert "nowhere.json" in fails(capfd, tmp_path, *build(scan, tmp_path / "nowhere.json", tmp_path))
 
 
-def test_a_scan_without_a_face(bpy, capfd, tmp_path, monkeypatch):
-    monkeypatch.setattr(placed_face, "LOOKS", LOOKS[:1])  # that none shows one is tested where faces are found
-    monkeypatch.setattr(placed_face, "PARTS", PARTS[:1])
+def test_a_scan_without_a_face(bpy, capfd, tmp_path, one_look):
     path = tmp_path / "ball.ply"
     rng = np.random.default_rng(0)
     points = rng.standard_normal((900, 3))

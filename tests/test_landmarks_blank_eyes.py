@@ -79,6 +79,7 @@ def test_a_turned_head_of_another_size_has_the_same(blank):
     there = {name: turn @ place for name, place in marks.items()}
     seen = blank_eyes(there, turn, Surface(target.vertices @ turn.T, target.triangles))
     true = blank_eyes(marks, np.eye(3), target)
+    assert set(seen) == {*CORNERS, *MARGINS}
     for name, place in seen.items():
         assert np.linalg.norm(place / 1.3 - turn @ true[name] / 1.3) < 0.5, name
 
@@ -166,7 +167,7 @@ def test_eyes_known_to_be_open_are_not_looked_at_again(reference, seen_skin, mon
 
 
 def test_the_eyes_of_a_mannequin(shared, reference):
-    """Its flat eyeballs were taken for lids half shut: margins of upper lids 6.5 mm too low."""
+    """Its flat eyeballs were taken for lids half shut: margins of upper lids 6 mm too low."""
     path = shared / "scans" / "rvcg_dummyhead.ply"
     found = finish(find_landmarks(clean_scan(read_ply(path))[0], reference)).positions
     true = read_landmarks(path.with_suffix(".landmarks.json"))

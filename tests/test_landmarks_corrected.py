@@ -7,10 +7,8 @@ import numpy as np
 import pytest
 
 from headshop.sim.anatomy.landmark_names import SKIN
-from headshop.sim.landmarks import placed_face
 from headshop.sim.landmarks.correction import follow_corrections, most_useful
 from headshop.sim.landmarks.find import FoundLandmarks
-from headshop.sim.landmarks.looks import LOOKS, PARTS
 
 
 @pytest.fixture
@@ -67,7 +65,7 @@ def test_found_landmarks_live_on_the_scan_apart_from_placed_ones(addon, referenc
     assert not scan_landmarks.most_useful(scan) and scan_landmarks.next_to_place(scan) == scan_landmarks.ORDER[0]
 
 
-def test_the_operator_finds_them_and_refuses_a_ball(addon, reference, monkeypatch):
+def test_the_operator_finds_them_and_refuses_a_ball(addon, reference, one_look):
     from headshop.headshop_addon import bridge, scan_landmarks
 
     scan = bridge.mesh_to_object(reference.skin, "Scan")
@@ -76,8 +74,6 @@ def test_the_operator_finds_them_and_refuses_a_ball(addon, reference, monkeypatc
     assert addon.ops.headshop.find_landmarks() == {"FINISHED"}
     places, truth = scan_landmarks.positions(scan, "FOUND"), reference.landmark_positions()
     assert np.mean([np.linalg.norm(places[n] - truth[n]) for n in places]) < 4.0
-    monkeypatch.setattr(placed_face, "LOOKS", LOOKS[:1])  # that none shows a face is tested where faces are found
-    monkeypatch.setattr(placed_face, "PARTS", PARTS[:1])
     addon.ops.mesh.primitive_uv_sphere_add(radius=0.11)
     addon.context.scene.headshop.scan = addon.context.active_object
     with pytest.raises(RuntimeError, match="No face"):

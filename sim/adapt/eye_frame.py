@@ -27,6 +27,15 @@ class EyeFrame:
         """Places (c, r, 3) mm at ``shares`` (c,) of the way and ``heights`` (r,) above it, in mm of the reference."""
         return (self.inner + shares[:, None] * self.way)[:, None] + self.scale * heights[:, None] * self.up
 
+    @property
+    def middle(self) -> np.ndarray:
+        """(3,) mm midway between the corners."""
+        return self.inner + self.way / 2
+
+    def grid(self, x, y) -> np.ndarray:
+        """Places (r, c, 3) mm at ``x`` (c,) along the eye from its middle and ``y`` (r,) above it, in mm of the reference."""
+        return self.middle + self.scale * (x[:, None] * self.along + y[:, None, None] * self.up)
+
     def depth(self, target: Surface, places, deep: float = DEEP) -> np.ndarray:
         """How far (...) the scan lies behind ``places`` (..., 3), in mm of the reference; NaN where it has nothing less than
         ``deep`` mm off."""

@@ -41,10 +41,7 @@ def blank_eyes(marks, matrix, target: Surface, sides: str = "lr") -> dict[str, n
     marks : name -> (3,) mm, about where ``en`` and ``ex`` lie; matrix (3, 3) turns and scales the reference into the scan
     """
     eyes = {side: eye_frame(marks, side, matrix) for side in sides}
-    seen = {}
-    for side, eye in eyes.items():
-        middle = eye.inner + eye.way / 2
-        seen[side] = eye.depth(target, middle + eye.scale * (X[:, None] * eye.along + Y[:, None, None] * eye.up))
+    seen = {side: eye.depth(target, eye.grid(X, Y)) for side, eye in eyes.items()}
     if not all(np.isfinite(depth).any() for depth in seen.values()):
         return {}
     slopes = {side: slope(depth) for side, depth in seen.items()}
@@ -55,11 +52,10 @@ def blank_eyes(marks, matrix, target: Surface, sides: str = "lr") -> dict[str, n
     out = {}
     for side, eye in eyes.items():
         for name, above in ABOVE.items():
-            mark = marks[f"{name}_{side}"] - eye.inner - eye.way / 2
-            across = mark @ eye.along / eye.scale + MOVED.get(name, (0.0,))[0]
+            across = (marks[f"{name}_{side}"] - eye.middle) @ eye.along / eye.scale + MOVED.get(name, (0.0,))[0]
             height = height_of(outline, name, across) + above
-            place = eye.inner + eye.way / 2 + eye.scale * (across * eye.along + height * eye.up)
-            depth = eye.depth(target, place[None, None])[0, 0]
+            place = eye.grid(np.array([across]), np.array([height]))[0, 0]
+            depth = eye.depth(target, place)
             if not np.isfinite(depth):
                 return {}
             out[f"{name}_{side}"] = eye.behind(place, depth)

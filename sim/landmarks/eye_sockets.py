@@ -32,7 +32,7 @@ def socket_corners(marks, matrix, target: Surface) -> dict[str, np.ndarray]:
     x, y = np.arange(-ASIDE, ASIDE + STEP / 2, STEP), np.arange(ACROSS, -ACROSS - STEP / 2, -STEP)
     for side in "lr":
         eye = eye_frame(marks, side, matrix)
-        places = eye.inner + eye.way / 2 + eye.scale * (x[:, None] * eye.along + y[:, None, None] * eye.up)
+        places = eye.grid(x, y)
         depth = eye.depth(target, places, BOTTOM * eye.scale)
         opening = opening_in(depth)
         if opening is None:

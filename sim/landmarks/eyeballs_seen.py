@@ -78,13 +78,11 @@ def eyeballs_seen(marks, matrix, target: Surface) -> dict[str, Eyeball]:
     balls, out = {}, {}
     for side in "lr":
         eye = eye_frame(marks, side, matrix)
-        middle = eye.inner + eye.way / 2
-        places = middle + eye.scale * (x[:, None] * eye.along + y[:, None, None] * eye.up)
-        ball = sphere_in(x, y, eye.depth(target, places))
+        ball = sphere_in(x, y, eye.depth(target, eye.grid(x, y)))
         if ball is not None:
             balls[side] = ball
             axes = np.stack([eye.along, eye.up, eye.forward])
-            out[side] = Eyeball(middle + eye.scale * ball.middle @ axes, eye.scale * ball.radius)
+            out[side] = Eyeball(eye.middle + eye.scale * ball.middle @ axes, eye.scale * ball.radius)
     alike = len(balls) == 2 and balls["l"].is_like(balls["r"])
     return {side: out[side] for side, ball in balls.items() if alike or ball.is_eyeball}
 
