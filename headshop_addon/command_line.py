@@ -16,6 +16,7 @@ from ..sim.errors import InputError
 
 INTERRUPTED = 130
 RELAX = ("auto", "always", "never")
+UNITS = ("mm", "cm", "m", "in")
 SETS = ("muscles", "facs", "arkit", "expressions", "rig")
 
 
@@ -42,7 +43,8 @@ def parser() -> argparse.ArgumentParser:
     chosen.add_argument("--head", dest="name", metavar="NAME", help="which head, if the file holds several")
     reading = argparse.ArgumentParser(add_help=False)
     reading.add_argument("scan", metavar="SCAN", help="PLY, OBJ, STL, glTF, USD, FBX, or a range map (ECH, NPZ, JSON)")
-    reading.add_argument("--units", choices=("mm", "cm", "m", "in"), help="the scan's unit (default: detected)")
+    about = "the scan's unit: mm, cm, m, in, or millimetres per unit as a number (default: detected)"
+    reading.add_argument("--units", type=_unit, metavar="UNIT", help=about)
     up = "the scan's up axis: X, Y, Z or, written --up=-Z, one upside down (default: detected)"
     reading.add_argument("--up", choices=("X", "Y", "Z", "-X", "-Y", "-Z"), metavar="AXIS", help=up)
 
@@ -91,6 +93,19 @@ def parser() -> argparse.ArgumentParser:
     sample.add_argument("--seed", type=int, default=None, help="another individual")
     sample.add_argument("-o", "--output", required=True, metavar="DIR")
     return program
+
+
+def _unit(text: str) -> str:
+    """What ``--units`` may be."""
+    try:
+        known = text in UNITS or 0 < float(text) < float("inf")
+    except ValueError:
+        known = False
+    if not known:
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is no unit: give mm, cm, m, in, or millimetres per unit as a number"
+        )
+    return text
 
 
 def main(argv: list[str] | None = None) -> int:

@@ -15,7 +15,8 @@ from ..sim.landmarks.find import find_landmarks
 from ..sim.mesh import Mesh
 from ..sim.progress import Progress, Work, portion
 from ..sim.scan.clean import cleaning
-from ..sim.scan.orientation import Orientation, detect, plausible_units
+from ..sim.scan.orientation import Orientation, detect, detecting
+from ..sim.scan.units import BY_FACE, plausible_units
 from . import bridge, heads, shape_keys
 from .detail_images import packing
 from .materials import dressing
@@ -41,7 +42,7 @@ def load_scan(path, landmarks: dict | None = None, unit: str | None = None, up: 
     """Work returning the `Scan` of a file: read, cleaned and turned upright.
 
     landmarks : name -> (3,) mm along the file's own axes; they help to find the axes, see `Orientation.turn`
-    unit, up : override what is detected: a name in `orientation.UNITS`, an axis such as ``+Y``
+    unit, up : override what is detected: a name in `units.UNITS` or mm per unit, an axis such as ``+Y``
 
     Raises
     ------
@@ -58,14 +59,15 @@ def load_scan(path, landmarks: dict | None = None, unit: str | None = None, up: 
 def prepare_scan(raw: Mesh, landmarks=None, unit=None, up=None, seconds=None) -> Work:
     """Work that cleans a mesh in any unit and axes and brings it to mm, Z up, face toward -Y; see `load_scan`."""
     mesh, counts = yield from portion(cleaning(raw), 0.0, 0.5)
-    yield Progress(0.5, "Finding out which way is up")
-    return _upright(mesh, counts, detect(mesh, landmarks, unit=unit, up=up), seconds)
+    found = yield from portion(detecting(mesh, landmarks, unit=unit, up=up), 0.5, 1.0)
+    return _upright(mesh, counts, found, unit, seconds)
 
 
-def _upright(mesh, counts, found, seconds):
+def _upright(mesh, counts, found, told, seconds):
     report = counts | {
         "unit": found.unit,
         "unit_scale": found.unit_scale,
+        "unit_told": told is not None,
         "up": found.up,
         "front": found.front,
         "certain": bool(found.certain),
@@ -90,11 +92,12 @@ def load_scan_alone(path, unit: str | None = None, up: str | None = None) -> Wor
     with timed(seconds, "clean"):
         mesh, counts = yield from portion(cleaning(raw), 0.02, 0.05)
     with timed(seconds, "landmarks"):
-        scales = plausible_units(mesh, unit)
-        found = yield from portion(find_landmarks(mesh, unit_scales=list(scales.values())), 0.05, 1.0)
-        name = next(name for name, scale in scales.items() if scale == found.unit_scale)
-        axes = detect(mesh, found.positions, unit=found.unit_scale if name == "custom" else name, up=up)
-    return _upright(mesh, counts, axes, seconds), found.placed(axes.turn(found.positions))
+        units = plausible_units(mesh, unit)
+        work = find_landmarks(mesh, unit_scales=list(units.values()), any_size=unit is None)
+        found = yield from portion(work, 0.05, 1.0)
+        name = next((name for name, scale in units.items() if scale == found.unit_scale), BY_FACE)
+        axes = detect(mesh, found.positions, unit=found.unit_scale, up=up, called=name)
+    return _upright(mesh, counts, axes, unit, seconds), found.placed(axes.turn(found.positions))
 
 
 def add_scan(scan: Scan, name: str, scene: bpy.types.Scene | None = None) -> bpy.types.Object:

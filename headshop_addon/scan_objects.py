@@ -17,6 +17,7 @@ from ..sim.anatomy.landmark_names import SKIN
 from ..sim.errors import InputError
 from ..sim.progress import Work, finish
 from ..sim.scan.orientation import Orientation
+from ..sim.scan.units import BY_FACE, unit_words
 from . import active, bridge, heads, pipeline, scan_landmarks
 
 TURN = "headshop_turn"
@@ -70,6 +71,26 @@ def _add(context, scan, name: str) -> bpy.types.Object:
     _clear_view(context, obj)
     look_at(context)
     return obj
+
+
+def unit_is_told(scan: bpy.types.Object) -> bool:
+    """Whether an artist said in which unit the ``scan`` is, so that its size is not questioned."""
+    return bool(_facts(scan).get("unit_told", True))
+
+
+def resize(scan: bpy.types.Object, factor: float) -> None:
+    """Make the ``scan``, which is of no known unit, ``factor`` times as large, with the landmarks on it."""
+    scan.data.transform(Matrix.Scale(factor, 4))
+    for item in scan_landmarks.entries(scan).values():
+        item.co, item.found = factor * Vector(item.co), factor * Vector(item.found)
+    facts = _facts(scan)
+    facts |= {"unit": BY_FACE, "unit_scale": factor * facts.get("unit_scale", 1.0)}
+    facts["orientation"] = f"Read as {unit_words(facts['unit'], facts['unit_scale'])}."
+    scan[heads.REPORT] = json.dumps({"scan": facts})
+
+
+def _facts(scan) -> dict:
+    return json.loads(scan.get(heads.REPORT, "{}")).get("scan", {})
 
 
 def _clear_view(context, obj) -> None:

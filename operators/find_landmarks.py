@@ -22,13 +22,22 @@ class HEADSHOP_OT_find_landmarks(Job, bpy.types.Operator):
 
     def work(self, context):
         """Look for the face in the scan's mesh."""
+        from ..headshop_addon import scan_objects
         from ..sim.landmarks.find import find_landmarks
 
         self._scan = active.scan(context)
-        return (yield from find_landmarks(bridge.object_to_mesh(self._scan)))
+        any_size = not scan_objects.unit_is_told(self._scan)
+        return (yield from find_landmarks(bridge.object_to_mesh(self._scan), any_size=any_size))
 
     def finish(self, context, result):
-        """Store them on the scan."""
+        """Store them on the scan, which is brought to a person's size if it is in no unit."""
+        from ..headshop_addon import scan_objects
+
+        said = result.summary()
+        if result.unit_scale != 1.0:
+            scan_objects.resize(self._scan, result.unit_scale)
+            scan_objects.look_at(context)
+            said += f"; no person's size, so the scan is {result.unit_scale:.3g} times as large now"
         scan_landmarks.take_found(self._scan, result)
         context.scene.headshop.show_landmarks = True
-        return f"{self._scan.name}: {result.summary()}"
+        return f"{self._scan.name}: {said}"

@@ -13,6 +13,7 @@ UNITS = (
     ("cm", "Centimetres", "Numbers in the file are centimetres"),
     ("m", "Metres", "Numbers in the file are metres"),
     ("in", "Inches", "Numbers in the file are inches"),
+    ("OTHER", "Other", "Numbers in the file are in a unit of its own"),
 )
 UP = (
     ("AUTO", "Detect", "Judge by the shape of the head"),
@@ -37,7 +38,19 @@ class HEADSHOP_OT_import_scan(FileJob, ImportHelper, bpy.types.Operator):
         options={"HIDDEN"},
     )
     unit: bpy.props.EnumProperty(name="Unit", description="Unit of length in the file", items=UNITS)
+    unit_mm: bpy.props.FloatProperty(
+        name="Millimetres per Unit", description="With Other: how long one unit is", default=1.0, min=1e-6, precision=4
+    )
     up: bpy.props.EnumProperty(name="Up", description="Direction of the crown of the head in the file", items=UP)
+
+    def draw(self, context):
+        """What is read how; the length of a unit only where it counts."""
+        layout = self.layout
+        layout.use_property_split = True
+        layout.prop(self, "unit")
+        if self.unit == "OTHER":
+            layout.prop(self, "unit_mm")
+        layout.prop(self, "up")
 
     @classmethod
     def poll(cls, context):
@@ -49,6 +62,7 @@ class HEADSHOP_OT_import_scan(FileJob, ImportHelper, bpy.types.Operator):
         from ..headshop_addon import scan_objects
 
         unit, up = (None if value == "AUTO" else value for value in (self.unit, self.up))
+        unit = self.unit_mm if unit == "OTHER" else unit
         return (yield from scan_objects.import_scan(context, self.filepath, unit, up))
 
     def finish(self, context, result):

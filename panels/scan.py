@@ -38,15 +38,19 @@ class HEADSHOP_PT_scan(SidebarPanel, bpy.types.Panel):
 
 
 def _facts(layout, context, scan):
+    from ..sim.scan.units import BY_FACE, UNITS
+
     facts = json.loads(scan.get(heads.REPORT, "{}")).get("scan", {})
     column = layout.column(align=True)
     column.scale_y = 0.85
     size = max(scan.dimensions) * 1000
     column.label(text=f"{len(scan.data.polygons):,} faces, {size:.0f} mm", icon="MESH_DATA")
     if "unit" in facts:
-        column.label(
-            text=f"Read as {facts['unit']}, {facts['up']} up, facing {facts['front']}", icon="ORIENTATION_GLOBAL"
-        )
+        unit, scale = facts["unit"], facts["unit_scale"]
+        unit = unit if unit in UNITS else f"1 unit = {scale:.4g} mm"
+        column.label(text=f"Read as {unit}, {facts['up']} up, facing {facts['front']}", icon="ORIENTATION_GLOBAL")
+        if facts["unit"] == BY_FACE:
+            column.label(text="Size guessed from the face", icon="FIXED_SIZE")
     removed = sum(facts.get(kind, 0) for kind in _FAULTS)
     if removed:
         column.label(text=f"{removed:,} faulty elements removed", icon="BRUSH_DATA")

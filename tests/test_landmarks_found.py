@@ -11,7 +11,7 @@ from headshop.sim.adapt.closest import Surface
 from headshop.sim.adapt.landmarks import read_landmarks
 from headshop.sim.anatomy.landmark_names import SKIN, mirrored
 from headshop.sim.errors import InputError
-from headshop.sim.landmarks import find, placed_face, verdict
+from headshop.sim.landmarks import find, looking, placed_face, verdict
 from headshop.sim.landmarks.find import better_of, find_landmarks
 from headshop.sim.landmarks.pose_search import Pose
 from headshop.sim.landmarks.shape_fit import ShapeFit, fit_shape
@@ -290,13 +290,13 @@ def test_a_place_hardly_like_a_face_is_taken_only_if_a_thorough_look_finds_no_be
         yield Progress(0.5, "")
         return [(first, 1.0, "first", None)] if look in placed_face.QUICK else [(second, 1.0, "second", None)]
 
-    monkeypatch.setattr(placed_face, "_trials", trials)
+    monkeypatch.setattr(looking, "_trials", trials)
 
     def as_it_is(reference, result):
         yield Progress(0.5, "")
         return result
 
-    monkeypatch.setattr(placed_face, "_fits", fits)
+    monkeypatch.setattr(looking, "_fits", fits)
     monkeypatch.setattr(placed_face, "_or_infant", as_it_is)
     monkeypatch.setattr(placed_face, "share_of", lambda *_: 1.0)
     scan = reference.skin
@@ -322,12 +322,12 @@ def test_a_thorough_look_begins_with_the_places_most_like_a_face(reference, monk
         return round(pose.scale / look.size, 6)
 
     for look, order in zip(placed_face.LOOKS, ([1.0, 3.0, 2.0], *([2.0, 1.0, 3.0],) * 3), strict=True):
-        monkeypatch.setattr(placed_face, "search_poses", search)
-        monkeypatch.setattr(placed_face, "fit_shape", fit)
-        monkeypatch.setattr(placed_face, "misfit_of", lambda _, pose, look=look: places[size(look, pose)][0])
-        monkeypatch.setattr(placed_face, "likeness_of", lambda _, __, pose, look=look: places[size(look, pose)][1])
+        monkeypatch.setattr(looking, "search_poses", search)
+        monkeypatch.setattr(looking, "fit_shape", fit)
+        monkeypatch.setattr(looking, "misfit_of", lambda _, pose, look=look: places[size(look, pose)][0])
+        monkeypatch.setattr(looking, "likeness_of", lambda _, __, pose, look=look: places[size(look, pose)][1])
         samples = reference.skin.vertices
-        work = placed_face._trials(look, reference, space, reference.skin, samples, samples, 1.0)
+        work = looking._trials(look, reference, space, reference.skin, samples, samples, 1.0)
         trials = sorted(finish(work), key=lambda t: t[0])
         assert list(dict.fromkeys(size(look, pose) for _, _, pose, _ in trials)) == order  # of a half, on either side
 

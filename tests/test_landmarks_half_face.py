@@ -7,7 +7,7 @@ import pytest
 from headshop.sim.adapt.build import build_head
 from headshop.sim.adapt.closest import Surface
 from headshop.sim.adapt.landmarks import read_landmarks
-from headshop.sim.landmarks import looks, placed_face
+from headshop.sim.landmarks import looking, looks, placed_face
 from headshop.sim.landmarks.both_sides import MIRROR
 from headshop.sim.landmarks.find import find_landmarks
 from headshop.sim.landmarks.hidden_skin import WIDE, unseen_face, with_hidden_skin
@@ -124,8 +124,8 @@ def test_half_a_face_is_looked_for_where_little_of_one_is_found(
         yield Progress(0.5, "")
         return [(first if look in QUICK else Verdict(True, 9.0, 0.3), 1.0, laid_on, laid_on)]
 
-    monkeypatch.setattr(placed_face, "_trials", trials)
-    monkeypatch.setattr(placed_face, "_fits", fits)
+    monkeypatch.setattr(looking, "_trials", trials)
+    monkeypatch.setattr(looking, "_fits", fits)
     monkeypatch.setattr(placed_face, "share_of", lambda *_: share)
     _, fit, _, _ = finish(placed_face.place_face(somebody[0], reference, space, (1.0,)))
     assert looked == list(LOOKS[:taken]) and fit is laid_on

@@ -9,7 +9,7 @@ import pytest
 
 from headshop.sim.adapt.closest import Surface
 from headshop.sim.anatomy.landmark_names import SKIN
-from headshop.sim.landmarks import find, infant, placed_face
+from headshop.sim.landmarks import find, infant, looking, placed_face
 from headshop.sim.landmarks import first_look as first
 from headshop.sim.landmarks.first_look import first_look
 from headshop.sim.landmarks.infant import infant_points, infant_space, with_mouth_in_place
@@ -173,8 +173,8 @@ def test_an_odd_face_may_be_an_infants(reference, space, monkeypatch, bad, asked
         return work((*result[:2], "infant", None, infant_space(reference, result[4])))
 
     found = [(Verdict(False, bad, 0.8), 1.0, "grown", None)]
-    monkeypatch.setattr(placed_face, "_trials", lambda *rest: work([(1.0, 1.0, None, None)]))
-    monkeypatch.setattr(placed_face, "_fits", lambda *rest: work(found))
+    monkeypatch.setattr(looking, "_trials", lambda *rest: work([(1.0, 1.0, None, None)]))
+    monkeypatch.setattr(looking, "_fits", lambda *rest: work(found))
     monkeypatch.setattr(placed_face, "_or_infant", other)
     monkeypatch.setattr(placed_face, "share_of", lambda *_: 1.0)
     _, fit, _, of = finish(placed_face.place_face(reference.skin, reference, space, (1.0,)))

@@ -15,7 +15,7 @@ from headshop.sim.landmarks import unseen_jaw
 from headshop.sim.landmarks.confidence import support
 from headshop.sim.landmarks.find import find_landmarks
 from headshop.sim.landmarks.first_look import first_look
-from headshop.sim.landmarks.placed_face import run
+from headshop.sim.landmarks.looking import run
 from headshop.sim.landmarks.shape_space import shape_space
 from headshop.sim.landmarks.unseen_jaw import PULLED_UP, below_lips, lip_to_chin, with_unseen_jaw
 from headshop.sim.mesh import Mesh

@@ -10,7 +10,7 @@ from headshop.sim.adapt.scan_surface import cuts_of, scan_surface
 from headshop.sim.adapt.skin_fit import fit_skin
 from headshop.sim.anatomy.landmark_names import SKIN
 from headshop.sim.errors import InputError
-from headshop.sim.landmarks import placed_face
+from headshop.sim.landmarks import looking
 from headshop.sim.landmarks.confidence import judge
 from headshop.sim.landmarks.find import find_landmarks
 from headshop.sim.landmarks.pose_search import Pose
@@ -135,11 +135,11 @@ def test_no_face_is_looked_for_on_a_flat_top(reference, cut_off, height, monkeyp
         raise SeenError
         yield
 
-    monkeypatch.setattr(placed_face, "search_poses", search)
+    monkeypatch.setattr(looking, "search_poses", search)
     with pytest.raises(SeenError):
         finish(find_landmarks(Mesh.from_triangles(*cut_off), reference))
     assert len(searched[0]) > 1000 and searched[0][:, 2].max() < height - 1
-    monkeypatch.setattr(placed_face, "cuts_of", lambda surface: np.zeros((0, 4)))
+    monkeypatch.setattr(looking, "cuts_of", lambda surface: np.zeros((0, 4)))
     with pytest.raises(SeenError):
         finish(find_landmarks(Mesh.from_triangles(*cut_off), reference))
     assert searched[1][:, 2].max() > height - 1  # what is to be left out was there

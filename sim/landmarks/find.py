@@ -14,8 +14,9 @@ from ..scan.depth_jumps import depth_jumps
 from .confidence import judge, judge_together, like_ears, sure_as_corners
 from .expression import fit_expression, line_of, meeting_lids, outline_of
 from .infant import with_mouth_in_place
+from .looking import run
 from .picked import picked
-from .placed_face import place_face, run, with_likelier_ears
+from .placed_face import place_face, with_likelier_ears
 from .pose_search import LOOKING
 from .shape_space import shape_space
 from .sure import SURE
@@ -63,10 +64,11 @@ class FoundLandmarks:
         return words + (f", {len(self.missing)} missing" if self.missing else "")
 
 
-def find_landmarks(mesh: Mesh, reference: Head | None = None, unit_scales=(1.0,)) -> Work:
+def find_landmarks(mesh: Mesh, reference: Head | None = None, unit_scales=(1.0,), any_size: bool = False) -> Work:
     """Work returning the `FoundLandmarks` of a cleaned scan, turned any way.
 
     unit_scales : mm per unit of the mesh, the likeliest of which is found as well
+    any_size : whether none of them may be right: if none makes the head a person's, it is brought to the size of most
 
     Raises
     ------
@@ -78,7 +80,8 @@ def find_landmarks(mesh: Mesh, reference: Head | None = None, unit_scales=(1.0,)
     jumps = depth_jumps(mesh.vertices, mesh.triangles)
     mesh = Mesh.from_triangles(mesh.vertices, mesh.triangles[~jumps]) if jumps.any() else mesh
     yield Progress(0.05, LOOKING)
-    scale, fit, target, space = yield from portion(place_face(mesh, reference, space, unit_scales), 0.05, 0.75)
+    placing = place_face(mesh, reference, space, unit_scales, any_size)
+    scale, fit, target, space = yield from portion(placing, 0.05, 0.75)
     fit = yield from portion(with_likelier_ears(space, target, fit), 0.75, 0.8)
     whole = space
     fit, space = yield from run(with_unseen_jaw(space, target, fit), 0.8, 0.81, "Looking for the mouth")

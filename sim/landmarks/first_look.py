@@ -23,8 +23,8 @@ from .held_by_lips import held_by_lips
 from .hidden_skin import UNSEEN, hidden_skin, unseen_face, unseen_scalp, with_hidden_skin
 from .infant import likelier_space, with_mouth_in_place
 from .lids_told import lids_told
+from .looking import facing_out, run
 from .picked import moved, picked
-from .placed_face import facing_out, run
 from .pose_search import Pose
 from .shape_fit import NoFaceError, Told, fit_shape
 from .shape_space import shape_space

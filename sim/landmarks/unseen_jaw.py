@@ -12,7 +12,8 @@ import numpy as np
 from ..adapt.closest import Surface
 from .confidence import in_mid_air
 from .hidden_skin import SEEN
-from .placed_face import SIZE, begun_again
+from .looking import SIZE
+from .placed_face import begun_again
 from .shape_fit import ShapeFit, pairs
 from .shape_space import ShapeSpace
 

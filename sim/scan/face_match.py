@@ -50,12 +50,14 @@ def face_template(head: Head) -> np.ndarray:
     return np.concatenate([[head.landmark_positions()["prn"]], _spread(skin[seen], MANY - 1)])
 
 
-def best_turns(points: np.ndarray, template: np.ndarray, turns: list[np.ndarray]) -> list[tuple[float, np.ndarray]]:
-    """(misfit in mm, turn) of the best placement of the face near each of ``turns``, best first.
+def best_turns(
+    points: np.ndarray, template: np.ndarray, turns: list[np.ndarray]
+) -> list[tuple[float, np.ndarray, float]]:
+    """(misfit in mm, turn, size) of the best placement of the face near each of ``turns``, best first.
 
     points (n, 3) mm : samples of the scan's surface, in its own axes; template (k, 3) mm : +Z up, face toward -Y;
     turns : rotations (3, 3) from the scan's axes to the template's. The misfit is the trimmed mean distance, on a
-    head of reference size.
+    head of reference size; the size is relative to the reference's.
     """
     fine = cKDTree(thinned(points, FINE))
     points = thinned(points, COARSE)
@@ -74,8 +76,8 @@ def best_turns(points: np.ndarray, template: np.ndarray, turns: list[np.ndarray]
     for k in np.argsort(misfit):
         # where it ended up may be nearer to another of the turns than to the one it began with
         nearest = max(range(len(turns)), key=lambda j: np.trace(turns[j] @ turn[k]))  # noqa: B023 (used at once)
-        out.setdefault(nearest, (float(misfit[k]), turns[nearest]))
-    return sorted(out.values(), key=lambda pair: pair[0])
+        out.setdefault(nearest, (float(misfit[k]), turns[nearest], float(scale[k])))
+    return sorted(out.values(), key=lambda entry: entry[0])
 
 
 def starts_of(points, template, few, turns):

@@ -9,19 +9,20 @@ from ..anatomy.head import Head
 from ..anatomy.storage import reference_head
 from ..errors import InputError
 from ..mesh import Mesh
+from ..progress import Progress, Work, finish, portion
 from .face_match import best_turns, face_template, surface_samples
+from .units import BY_FACE, CUSTOM, SMALLEST, is_human, no_head, sizes_to_try, unit_of_landmarks, unit_words, units_of
 
-#: Unit -> mm.
-UNITS = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
-
-#: Largest extent of a scan of a face patch (the smallest) and of a bust (the largest), mm.
-PLAUSIBLE = (90.0, 900.0)
-BODY = 2600.0  # mm, the same of somebody from head to foot: taken for that only if no unit makes a head of it
-
+LOOKING = "Finding out which way is up"
 AXES = {sign + name: s * np.eye(3)[k] for k, name in enumerate("XYZ") for sign, s in (("+", 1.0), ("-", -1.0))}
 
 #: A second orientation that fits this much worse is no rival; a worse fit than this (mm) is no face.
 RIVAL, POOR = 1.25, 4.5
+#: mm: better fits than these are a face beyond doubt, and one of about the size it was looked for. Scans in their own unit,
+#: MakeHuman's children and a CT's among them, have 1.3 to 3.2, half of them more than the second; the reference 30 % too large
+#: has 3.0; animals, parts and balls in any size 3.4 and more.
+PLAIN, OWN = 3.3, 2.4
+OTHER = 1.3  # times a size that is plainly not its own: another that is tried
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,7 +31,7 @@ class Orientation:
 
     Attributes
     ----------
-    unit : name from `UNITS`, or ``custom``
+    unit : name from `units.UNITS`, `CUSTOM` or `BY_FACE`
     unit_scale : mm per scan unit
     up, front : the scan's own axes that point up and where the face looks, like ``+Z`` and ``-Y``
     rotation : (3, 3) proper, permutes and flips axes only: the scan keeps its own place and tilt
@@ -66,7 +67,12 @@ class Orientation:
         return {name: self.rotation @ np.asarray(p, dtype=float) for name, p in landmarks.items()}
 
 
-def detect(
+def detect(mesh: Mesh, landmarks: dict[str, np.ndarray] | None = None, **options) -> Orientation:
+    """What `detecting`, which takes the same, finds."""
+    return finish(detecting(mesh, landmarks, **options))
+
+
+def detecting(
     mesh: Mesh,
     landmarks: dict[str, np.ndarray] | None = None,
     *,
@@ -74,35 +80,45 @@ def detect(
     up: str | None = None,
     front: str | None = None,
     reference: Head | None = None,
-) -> Orientation:
-    """Unit, up axis and front of a scan; what is given as ``unit``, ``up`` or ``front`` is not questioned.
+    called: str = CUSTOM,
+) -> Work:
+    """Work returning the `Orientation` of a scan: what is given as ``unit``, ``up`` or ``front`` is not questioned.
 
     landmarks : name -> (3,) mm along the scan's own axes; three or more not on a line decide the axes and the unit.
-    Without them the face of the reference head is laid on the scan in all 24 positions, and the best fit wins.
+    Without them the face of the reference head is laid on the scan in all 24 positions, and the best fit wins; if it
+    fits in no usual unit, in any size, and the unit is such that the head is as large as the reference.
+    called : what a unit is called that is given as a number
 
     Raises
     ------
-    InputError : no unit makes the scan as large as a head, or an override is not understood.
+    InputError : the scan is no head in any unit, or an override is not understood.
     """
+    yield Progress(0.0, LOOKING)
     reference = reference or reference_head()
     allowed = _allowed(up, front)
     points = surface_samples(mesh)
-    units = _units(points, unit)
+    units = units_of(points, unit, called)
     if landmarks is not None:
         turn, spread = _turn_of_landmarks(landmarks, reference.landmark_positions())
         if turn is not None:
-            name, scale = _unit_of_landmarks(points, landmarks, units)
+            name, scale = unit_of_landmarks(points, landmarks, units, unit is not None)
             return _by_landmarks(turn, spread, allowed, name, scale)
     template = face_template(reference)
-    found = []  # (misfit mm, unit, scale, rotation)
-    for name, scale in units:
-        found += [(misfit, name, scale, turn) for misfit, turn in best_turns(points * scale, template, allowed)]
-    found.sort(key=lambda entry: entry[0])
-    misfit, name, scale, rotation = found[0]
+    found = yield from portion(_placements(points, template, allowed, units), 0.0, 0.3)
+    if unit is None and not (found and found[0][0] < OWN):
+        near = found and found[0][0] < PLAIN
+        sizes = [found[0][2] / OTHER, found[0][2] * OTHER] if near else sizes_to_try(points)
+        guesses = [(BY_FACE, scale) for scale in sizes]
+        guesses = yield from portion(_placements(points, template, allowed, guesses), 0.3, 0.9)
+        if guesses[0][0] < min([PLAIN, *(entry[0] for entry in found)]):
+            found = yield from portion(_sized(points, template, allowed, guesses[0], units), 0.9, 1.0)
+    if not found:
+        raise no_head(points)
+    misfit, name, scale, rotation, _ = found[0]
     rivals = [e for e in found[1:] if e[1] != name or not np.allclose(e[3], rotation)]
     up, front = _names(rotation)
     extent = np.ptp(points, axis=0).max() * scale
-    reason = f"read as {_unit_words(name, scale)} ({extent:.0f} mm across), {up} up, face toward {front}"
+    reason = f"read as {unit_words(name, scale)} ({extent:.0f} mm across), {up} up, face toward {front}"
     certain = not rivals or (misfit < POOR and rivals[0][0] > RIVAL * misfit)
     if unit is not None and len(allowed) == 1:
         reason, certain = reason + ", as told", True
@@ -117,14 +133,26 @@ def detect(
     return Orientation(name, scale, up, front, rotation, certain, reason[0].upper() + reason[1:] + ".")
 
 
-def plausible_units(mesh: Mesh, unit: str | float | None = None) -> dict[str, float]:
-    """Unit -> mm, of those in which the scan is as large as a head; only ``unit`` where it is given.
+def _placements(points, template, allowed, units) -> Work:
+    """Work returning where the face of the ``template`` lies on ``points`` in each of ``units``, best first: misfit mm, unit,
+    scale, rotation, size of the reference's."""
+    found = []
+    for k, (name, scale) in enumerate(units):
+        yield Progress(k / len(units), LOOKING)
+        turns = best_turns(points * scale, template, allowed)
+        found += [(misfit, name, scale, turn, size) for misfit, turn, size in turns]
+    return sorted(found, key=lambda entry: entry[0])
 
-    Raises
-    ------
-    InputError : there is none, or ``unit`` is not understood.
-    """
-    return dict(_units(surface_samples(mesh), unit))
+
+def _sized(points, template, allowed, guess, units) -> Work:
+    """Work returning `_placements` where the ``guess``, one of them, lies: in the one of ``units`` that makes the head a
+    person's; if none does it is as large as the reference, which is as good a guess as any."""
+    _, _, scale, _, size = guess
+    again = yield from _placements(points, template, allowed, [(BY_FACE, scale / size)])
+    _, _, scale, _, size = again[0]
+    usual = (unit for unit in units if is_human(size * unit[1] / scale, SMALLEST))
+    unit = next(usual, (BY_FACE, scale / size))
+    return [(misfit, *unit, turn, size) for misfit, _, _, turn, size in again]
 
 
 def rotations() -> list[np.ndarray]:
@@ -167,35 +195,6 @@ def _allowed(up, front):
     return [r for r in rotations() if up in (None, _names(r)[0]) and front in (None, _names(r)[1])]
 
 
-def _units(points, unit) -> list[tuple[str, float]]:
-    if isinstance(unit, str) and unit.strip().lower() in UNITS:
-        name = unit.strip().lower()
-        return [(name, UNITS[name])]
-    if unit is not None:
-        try:
-            scale = float(unit)
-        except ValueError:
-            scale = float("nan")
-        if not 0 < scale < float("inf"):
-            raise InputError(f"{unit!r} is no unit: give mm, cm, m, in, or millimetres per unit as a number.")
-        return [("custom", scale)]
-    extent = np.ptp(points, axis=0).max()
-    least, most = PLAUSIBLE
-    units = [(name, scale) for name, scale in UNITS.items() if least <= extent * scale <= most]
-    units = units or [(name, scale) for name, scale in UNITS.items() if most < extent * scale <= BODY]
-    if not units:
-        raise InputError(
-            f"The scan is {extent:.4g} units across, which is no head in mm, cm, m or inches: give the unit, as a name "
-            "or as millimetres per unit."
-        )
-    return units
-
-
-def _unit_words(name, scale):
-    words = {"mm": "millimetres", "cm": "centimetres", "m": "metres", "in": "inches"}
-    return words.get(name, f"units of {scale:g} mm")
-
-
 def _turn_of_landmarks(given, canonical):
     """The rotation (3, 3) that takes the landmarks to the reference's directions (Kabsch 1976); None if on a line."""
     names = [n for n in given if n in canonical and np.isfinite(given[n]).all()]
@@ -209,20 +208,12 @@ def _turn_of_landmarks(given, canonical):
     return u @ np.diag([1, 1, np.sign(np.linalg.det(u @ vt))]) @ vt, s[1] / s[0]
 
 
-def _unit_of_landmarks(points, landmarks, units):
-    """The unit in which the landmarks lie nearest to the scan."""
-    from scipy.spatial import cKDTree
-
-    marks = np.array([p for p in landmarks.values() if np.isfinite(p).all()], dtype=float)
-    return min(units, key=lambda u: np.median(cKDTree(points * u[1]).query(marks)[0]))
-
-
 def _by_landmarks(turn, spread, allowed, name, scale):
     rotation = max(allowed, key=lambda r: np.trace(r.T @ turn))
     tilt = np.degrees(np.arccos(np.clip((np.trace(rotation.T @ turn) - 1) / 2, -1, 1)))
     up, front = _names(rotation)
     certain = bool(tilt < 35)
-    reason = f"Read as {_unit_words(name, scale)}, {up} up, face toward {front}: the landmarks say so"
+    reason = f"Read as {unit_words(name, scale)}, {up} up, face toward {front}: the landmarks say so"
     if not certain:
         reason += f", but the head is turned by {tilt:.0f} degrees from these axes: check them"
     return Orientation(name, scale, up, front, rotation, certain, reason + ".")
