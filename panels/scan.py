@@ -46,8 +46,7 @@ def _facts(layout, context, scan):
     size = max(scan.dimensions) * 1000
     column.label(text=f"{len(scan.data.polygons):,} faces, {size:.0f} mm", icon="MESH_DATA")
     if "unit" in facts:
-        unit, scale = facts["unit"], facts["unit_scale"]
-        unit = unit if unit in UNITS else f"1 unit = {scale:.4g} mm"
+        unit = facts["unit"] if facts["unit"] in UNITS else f"1 unit = {facts['unit_scale']:.4g} mm"
         column.label(text=f"Read as {unit}, {facts['up']} up, facing {facts['front']}", icon="ORIENTATION_GLOBAL")
         if facts["unit"] == BY_FACE:
             column.label(text="Size guessed from the face", icon="FIXED_SIZE")

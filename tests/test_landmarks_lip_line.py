@@ -22,13 +22,13 @@ HALF, RISE = 22.0, 3.0  # mm: half the mouth's width, how far its corners are ra
 FORWARD = np.array([0.0, -1.0, 0.0])
 
 
-def _face(deep=2.0, slit=False, noise=0.0, speck=False, hole=False, ends=(-40.0, -40.0)):
+def _face(deep=2.0, slit=False, noise=0.0, speck=False, hole=False, ends=(-40.0, -40.0), half=HALF):
     """A rounded surface with a crease in it like that between closed lips, ``deep`` mm, or a ``slit`` without data; with
     ``noise`` mm, a ``speck`` without data 12 mm beyond the left corner, and a ``hole`` about the right one; it ends so many mm
-    below the line's middle about that corner, and elsewhere."""
+    below the line's middle about that corner, and elsewhere; the crease is seen for ``half`` mm to either side."""
     x, z = np.meshgrid(np.arange(-60, 60.1, 0.5), np.arange(-40, 40.1, 0.5))
     high = z - RISE * (x / HALF) ** 2
-    along = np.clip((HALF - np.abs(x)) / 3, 0, 1)
+    along = np.clip((half - np.abs(x)) / 3, 0, 1)
     y = (
         x**2 / 40
         + deep * along * np.exp(-((high / 1.0) ** 2))
@@ -93,6 +93,15 @@ def test_no_line_goes_on_along_the_end_of_a_scan(end):
 def test_a_corner_at_the_end_of_a_scan_is_not_told(near, told):
     found = lip_line(_face(ends=(RISE - near, -40.0)), _guess(4.0), FORWARD)
     assert set(found.corners) == told
+
+
+def test_a_line_as_short_as_no_mouth_tells_where_it_is_but_not_how_wide():
+    """That of a coarse mannequin is plain in the middle only."""
+    found = lip_line(_face(half=15.0), _guess(4.0), FORWARD)
+    assert not found.corners and set(found.marks) == {"sto"}
+    assert found.middle[[0, 2]] == pytest.approx([0, 0], abs=1.0)
+    assert set(lip_line(_face(half=19.5), _guess(4.0), FORWARD).corners) == {"ch_l", "ch_r"}
+    assert lip_line(_face(half=11.0), _guess(4.0), FORWARD) is None
 
 
 def test_what_is_missing_to_the_end_of_a_column_may_go_on_beyond():

@@ -31,6 +31,9 @@ AROUND = 4  # columns beside a corner that tell how deep it lies, and must not l
 #: scans of 42 that show where closed ones meet they did from 4 mm before to 6 mm behind; what showed through lay 14 behind.
 WITHIN = 9.0
 SLIT = 4.0  # mm from above to below of what a scanner loses between lips; what is wider is a hole, and tells nothing
+#: mm between corners below which the line ended before them. The narrowest of twelve mouths of known width has 41; a
+#: mannequin's of few triangles, 63 wide, is a crease of .75 mm for 26.
+NARROWEST = 33.0
 END = 3.0  # mm above and below the line within which a scan that ends leaves open how deep it is
 
 
@@ -61,9 +64,11 @@ def lip_line(target: Surface, marks, forward, scale: float = 1.0) -> LipLine | N
         found = target.closest((places[end] - scale * _behind(depth, end) * forward)[None], NEAR * scale)
         if found.found[0] and not hole[max(end - AROUND, 0) : end + AROUND + 1].any():
             corners[name] = found.points[0]
-    if not corners or np.ptp(line_ends(worth)) * ASIDE < NARROW:
+    wide = np.ptp(line_ends(worth)) * ASIDE
+    if not corners or wide < NARROW:
         return None
-    return LipLine(corners, _middle(depth, places, forward, scale))
+    short = len(corners) == 2 and wide < NARROWEST
+    return LipLine({} if short else corners, _middle(depth, places, forward, scale))
 
 
 def lip_height(target: Surface, marks, forward, scale: float = 1.0) -> np.ndarray | None:

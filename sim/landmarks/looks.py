@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How a face is looked for in a scan: at first a quick look, then ever more thorough ones."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -52,10 +52,12 @@ LOOKS = (
     Look(False, False, 0.8, 1000, 400, 14, 4, np.inf, 4, 4, 0.7, 2.0),
     Look(True, False, 0.7, 1000, 400, 14, 4, np.inf, 4, 4, 0.7, 2.0),
 )
+#: The first, but shorter, for a face that may have any size: it is taken at many.
+ANY_SIZE = replace(LOOKS[0], tried=4, most=2, further=3, again=1)
 #: Shares of the work at which trials of each look begin, and its fits begin and end. Between the first and the second a face
 #: may be looked for in any size.
 PARTS = ((0.0, 0.4, 0.55), (0.7, 0.73, 0.75), (0.75, 0.83, 0.88), (0.88, 0.94, 0.98))
-ANY_SIZE = 0.7  # share at which that is done
+SIZED = 0.7  # share at which that is done
 MIDDLE = 6.0  # mm: so far half a face goes beyond the middle
 WHOLE = 0.65  # share of a face that finds the scan, below which half of one is looked for as well
 PLAIN = 0.66  # relief from which on a quick look is enough: faces have as much

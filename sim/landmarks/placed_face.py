@@ -15,7 +15,7 @@ from .any_size import face_of_any_size, of_human_size, of_most
 from .confidence import like_ears
 from .infant import infant_points, infant_space
 from .looking import FITTING, SIZE, TRIAL_MODES, lies, looked, run
-from .looks import ANY_SIZE, LOOKS, PARTS, PLAIN, QUICK, WHOLE
+from .looks import LOOKS, PARTS, PLAIN, QUICK, SIZED, WHOLE
 from .shape_fit import TRIAL, NoFaceError, ShapeFit, fit_shape
 from .shape_space import ShapeSpace
 from .verdict import ODD, judged, likeness_of, misfit_of, share_of, weighed
@@ -69,9 +69,9 @@ def place_face(mesh: Mesh, reference: Head, space: ShapeSpace, unit_scales, any_
             return best[1:]
         if any_size and look is LOOKS[0]:
             work = face_of_any_size(mesh, reference, space, template, unit_scales, or_infant)
-            scale, closer = yield from portion(work, high, ANY_SIZE)
+            scale, closer = yield from portion(work, high, SIZED)
             if scale is not None:
-                return (yield from portion(brought_to(scale), ANY_SIZE, 1.0))
+                return (yield from portion(brought_to(scale), SIZED, 1.0))
             unit_scales = unit_scales or closer
     raise InputError(NO_FACE)
 
