@@ -1,18 +1,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Landmarks of scans in no known unit: the face is found in any size, and its head is made a person's, unless it is one."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from headshop.sim.adapt.closest import Surface
 from headshop.sim.landmarks import any_size, looks
 from headshop.sim.landmarks.any_size import face_of_any_size, of_human_size
 from headshop.sim.landmarks.find import find_landmarks
 from headshop.sim.landmarks.infant import infant_space
+from headshop.sim.landmarks.looking import lies
+from headshop.sim.landmarks.pose_search import Pose
+from headshop.sim.landmarks.shape_fit import ShapeFit
 from headshop.sim.landmarks.shape_space import shape_space
-from headshop.sim.landmarks.verdict import ODD, Verdict
+from headshop.sim.landmarks.verdict import ODD, Verdict, judged
 from headshop.sim.mesh import Mesh
 from headshop.sim.progress import Progress, finish
 from headshop.sim.scan.units import plausible_units, sizes_to_try
@@ -55,8 +57,9 @@ PLAIN = Verdict(False, 2.0, 0.9)
 
 def _result(space, size, verdict=PLAIN, scale=1.0):
     """A face of ``size``, of the reference's, in a scan of ``scale`` mm per unit."""
-    fit = SimpleNamespace(points=size * space.points, pose=SimpleNamespace(misfit=0.0))
-    return verdict, scale, fit, None, space
+    points, nothing = size * space.points, np.zeros(len(space.points))
+    fit = ShapeFit(points, nothing[:3], Pose(size, np.eye(3), nothing[:3], 0.0), nothing + 1, nothing, nothing)
+    return verdict, scale, fit, Surface(points, space.triangles), space
 
 
 @pytest.mark.parametrize(
@@ -71,20 +74,27 @@ def _result(space, size, verdict=PLAIN, scale=1.0):
     ],
 )
 def test_a_small_head_is_a_persons_if_its_face_is_a_babys(reference, size, baby, human):
-    result = _result(shape_space(reference), size)
+    space, asked = shape_space(reference), []
+    grown = judged(reference, space, _result(space, 1.0)[2], looks.LOOKS[-1].relief)
 
-    def or_infant(given):
-        assert given is result
+    def or_infant(given, less):
+        verdict, _, fit, target, _ = given
+        assert verdict == pytest.approx(grown) and less == 1.0  # whatever its size
+        most = infant_space(reference, space).size
+        assert lies(space, fit).scale == pytest.approx(most) == fit.pose.scale
+        assert np.ptp(target.vertices, axis=0) == pytest.approx(most * np.ptp(space.points, axis=0))
+        asked.append(given)
         yield Progress(0.5, "")
         return object() if baby else given
 
-    assert finish(of_human_size(result, size, or_infant)) is human
+    assert finish(of_human_size(reference, _result(space, size), size, or_infant)) is human
+    assert bool(asked) == (size == 0.6)
 
 
 @pytest.mark.parametrize(("size", "human"), [(0.6, True), (0.5, False), (1.3, False)])
 def test_a_head_found_as_a_babys_needs_no_other_look(reference, size, human):
     result = _result(infant_space(reference, shape_space(reference)), size)
-    assert finish(of_human_size(result, size, None)) is human
+    assert finish(of_human_size(reference, result, size, None)) is human
 
 
 @pytest.mark.parametrize(

@@ -292,7 +292,7 @@ def test_a_place_hardly_like_a_face_is_taken_only_if_a_thorough_look_finds_no_be
 
     monkeypatch.setattr(looking, "_trials", trials)
 
-    def as_it_is(reference, result):
+    def as_it_is(reference, result, less):
         yield Progress(0.5, "")
         return result
 

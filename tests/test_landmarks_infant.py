@@ -145,7 +145,7 @@ def test_a_face_is_laid_anew_as_an_infants_only_where_that_is_plainly_less_bad(
     target = Surface(points, infants.triangles)
     fit = _laid(space, target, np.eye(3), infants.landmarks(points)["prn"])
     monkeypatch.setattr(placed_face, "judged", lambda *_: Verdict(doubtful, bad, 0.8))
-    best = finish(placed_face._or_infant(reference, (Verdict(False, 10.0, 0.7), 1.0, fit, target, space)))
+    best = finish(placed_face._or_infant(reference, (Verdict(False, 10.0, 0.7), 1.0, fit, target, space), 0.85))
     assert best[4].of_infants == taken
 
 
@@ -169,7 +169,7 @@ def test_an_odd_face_may_be_an_infants(reference, space, monkeypatch, bad, asked
         yield Progress(0.5, "")
         return value
 
-    def other(reference, result):
+    def other(reference, result, less):
         return work((*result[:2], "infant", None, infant_space(reference, result[4])))
 
     found = [(Verdict(False, bad, 0.8), 1.0, "grown", None)]

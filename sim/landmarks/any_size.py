@@ -1,15 +1,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Faces in scans of no known unit: looked for at every size that a person's may have, then brought to that of most people."""
 
+from dataclasses import replace
+
+from ..adapt.closest import Surface
+from ..adapt.scan_surface import NORMALS
 from ..anatomy.head import Head
 from ..mesh import Mesh
 from ..progress import Work, portion
 from ..scan.face_match import surface_samples
 from ..scan.units import SMALLEST, is_human, sizes_to_try
+from .infant import infant_space
 from .looking import lies, looked
-from .looks import ANY_SIZE, PLAIN, WHOLE
+from .looks import ANY_SIZE, LOOKS, PLAIN, WHOLE
 from .shape_space import ShapeSpace
-from .verdict import ODD, share_of
+from .verdict import ODD, judged, share_of
 
 FURTHER = 2  # sizes at which a face is looked for again if it was not seen at first
 
@@ -31,19 +36,36 @@ def face_of_any_size(mesh: Mesh, reference: Head, space: ShapeSpace, template, u
             continue
         for unit in unit_scales:
             size = lies(space, fit).scale * unit / scale
-            if (yield from portion(of_human_size(result, size, or_infant), 0.9, 1.0)):
+            if (yield from portion(of_human_size(reference, result, size, or_infant), 0.9, 1.0)):
                 return None, closer
         return of_most(result), closer
     return None, closer
 
 
-def of_human_size(result, size: float, or_infant) -> Work:
+def of_human_size(reference: Head, result, size: float, or_infant) -> Work:
     """Work returning whether a head of ``size``, of the reference's, is a person's, if ``result``, one of those of `looked`, is
-    its face; ``or_infant`` : Work of a result returning another if that shows an infant's face."""
-    *_, space = result
+    its face; ``or_infant`` : Work of a result returning another if that, an infant's, is so many times as bad or less.
+
+    A head as small as a baby's is one if it is no worse as a baby's of most babies' size than as a grown one of theirs:
+    MakeHuman's babies are .86 to .91 times as bad so, grown heads .94 to 1.4.
+    """
+    *_, fit, _, space = result
     if space.of_infants or is_human(size) or not is_human(size, SMALLEST):
         return is_human(size, SMALLEST)
-    return (yield from or_infant(result)) is not result
+    own = lies(space, fit).scale
+    grown = _resized(reference, result, space.size / own)
+    baby = _resized(reference, result, infant_space(reference, space).size / own)
+    rival = (grown[0], *baby[1:])
+    return (yield from or_infant(rival, 1.0)) is not rival
+
+
+def _resized(reference, result, factor):
+    """``result``, one of those of `looked`, as it were if the scan were ``factor`` times as large."""
+    _, scale, fit, target, space = result
+    pose = replace(fit.pose, scale=factor * fit.pose.scale, shift=factor * fit.pose.shift)
+    fit = replace(fit, points=factor * fit.points, distance=factor * fit.distance, pose=pose)
+    verdict = judged(reference, space, fit, LOOKS[-1].relief)
+    return verdict, factor * scale, fit, Surface(factor * target.vertices, target.triangles, NORMALS), space
 
 
 def of_most(result) -> float:

@@ -46,8 +46,8 @@ def place_face(mesh: Mesh, reference: Head, space: ShapeSpace, unit_scales, any_
     """
     template, grown, seen = face_template(reference), space, []
 
-    def or_infant(result):
-        return _or_infant(reference, result)
+    def or_infant(result, less=LESS_BAD):
+        return _or_infant(reference, result, less)
 
     def brought_to(scale):
         return place_face(mesh, reference, grown, [scale])
@@ -64,7 +64,9 @@ def place_face(mesh: Mesh, reference: Head, space: ShapeSpace, unit_scales, any_
             elif best[0].bad > ODD:
                 best = yield from portion(or_infant(best), high, 1.0)
             _, _, fit, _, of = best
-            if any_size and not (yield from portion(of_human_size(best, lies(of, fit).scale, or_infant), high, 1.0)):
+            if any_size and not (
+                yield from portion(of_human_size(reference, best, lies(of, fit).scale, or_infant), high, 1.0)
+            ):
                 return (yield from portion(brought_to(of_most(best)), high, 1.0))
             return best[1:]
         if any_size and look is LOOKS[0]:
@@ -107,13 +109,13 @@ def begun_again(space: ShapeSpace, target: Surface, fit: ShapeFit, size: float |
         return None
 
 
-def _or_infant(reference, result) -> Work:
-    """Work returning ``result``, one of those of `looked`, or one of an infant's face that is
-    begun from where it lies, if that is plainly less bad."""
+def _or_infant(reference, result, less) -> Work:
+    """Work returning ``result``, one of those of `looked`, or one of an infant's face that is begun from where it lies, if
+    that is less than ``less`` times as bad."""
     _, scale, fit, target, space = result
     infants = infant_space(reference, space)
     rival = yield from _begun_from([lies(space, fit)], reference, scale, target, infants)
-    return rival if rival and not rival[0].doubtful and rival[0].bad < LESS_BAD * result[0].bad else result
+    return rival if rival and not rival[0].doubtful and rival[0].bad < less * result[0].bad else result
 
 
 def _or_turned_over(reference, result) -> Work:
