@@ -69,7 +69,7 @@ def place_face(mesh: Mesh, reference: Head, space: ShapeSpace, unit_scales, any_
             ):
                 return (yield from portion(brought_to(of_most(best)), high, 1.0))
             return best[1:]
-        if any_size and look is LOOKS[0]:
+        if any_size and look is LOOKS[0] and (best is None or best[0].doubtful):
             work = face_of_any_size(mesh, reference, space, template, unit_scales, or_infant)
             scale, closer = yield from portion(work, high, SIZED)
             if scale is not None:
