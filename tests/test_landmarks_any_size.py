@@ -6,7 +6,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from headshop.sim.adapt.closest import Surface
-from headshop.sim.landmarks import any_size, looks
+from headshop.sim.landmarks import any_size, looks, placed_face
 from headshop.sim.landmarks.any_size import face_of_any_size, of_human_size
 from headshop.sim.landmarks.find import find_landmarks
 from headshop.sim.landmarks.infant import infant_space
@@ -130,3 +130,25 @@ def test_units_are_those_of_a_head(reference):
     assert plausible_units(reference.skin) == {"mm": 1.0}
     assert plausible_units(reference.skin.moved(reference.skin.vertices / 1e4)) == {}
     assert plausible_units(reference.skin, "0.37") == {"custom": 0.37}
+
+
+def test_what_is_seen_at_a_second_look_in_no_unit_is_brought_to_most_peoples_size(reference, monkeypatch):
+    """Half a face, say: it is looked for at the likeliest sizes, none of which is known to be its own."""
+    space, asked = shape_space(reference), []
+
+    def looked(look, mesh, reference, space, template, scales, split):
+        asked.append((look, scales))
+        yield Progress(0.5, "")
+        return [_result(space, 0.9, PLAIN, 4.0)] if look is not looks.LOOKS[0] else []
+
+    def sized(*_):
+        yield Progress(0.5, "")
+        return None, [4.0, 6.0]
+
+    monkeypatch.setattr(placed_face, "looked", looked)
+    monkeypatch.setattr(placed_face, "face_of_any_size", sized)
+    monkeypatch.setattr(placed_face, "share_of", lambda *_: 1.0)
+    finish(placed_face.place_face(reference.skin, reference, space, (), any_size=True))
+    first, half = looks.LOOKS[:2]
+    brought = pytest.approx([4.0 / 0.9])
+    assert asked == [(first, ()), (half, [4.0, 6.0]), (first, brought), (half, brought)]

@@ -44,7 +44,7 @@ def place_face(mesh: Mesh, reference: Head, space: ShapeSpace, unit_scales, any_
     ------
     InputError : there is no face in it.
     """
-    template, grown, seen = face_template(reference), space, []
+    template, grown, known, seen = face_template(reference), space, unit_scales, []
 
     def or_infant(result, less=LESS_BAD):
         return _or_infant(reference, result, less)
@@ -63,12 +63,11 @@ def place_face(mesh: Mesh, reference: Head, space: ShapeSpace, unit_scales, any_
                 best = yield from portion(_or_turned_over(reference, best), high, 1.0)
             elif best[0].bad > ODD:
                 best = yield from portion(or_infant(best), high, 1.0)
-            _, _, fit, _, of = best
-            if any_size and not (
-                yield from portion(of_human_size(reference, best, lies(of, fit).scale, or_infant), high, 1.0)
-            ):
-                return (yield from portion(brought_to(of_most(best)), high, 1.0))
-            return best[1:]
+            _, scale, fit, _, of = best
+            own = not any_size
+            if any_size and scale in known:
+                own = yield from portion(of_human_size(reference, best, lies(of, fit).scale, or_infant), high, 1.0)
+            return best[1:] if own else (yield from portion(brought_to(of_most(best)), high, 1.0))
         if any_size and look is LOOKS[0] and (best is None or best[0].doubtful):
             work = face_of_any_size(mesh, reference, space, template, unit_scales, or_infant)
             scale, closer = yield from portion(work, high, SIZED)
