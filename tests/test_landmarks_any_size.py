@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from headshop.sim.adapt.closest import Surface
 from headshop.sim.landmarks import any_size, looks, placed_face
-from headshop.sim.landmarks.any_size import face_of_any_size, of_human_size
+from headshop.sim.landmarks.any_size import face_of_any_size, of_human_size, of_most
 from headshop.sim.landmarks.find import find_landmarks
 from headshop.sim.landmarks.infant import infant_space
 from headshop.sim.landmarks.looking import lies
@@ -124,6 +124,13 @@ def test_only_a_plain_face_of_no_persons_size_tells_the_unit(reference, monkeypa
     scale, closer = finish(face_of_any_size(reference.skin, reference, space, None, units, None))
     assert scale == (pytest.approx(4.0 / 0.8) if sized else None)
     assert closer == [4.0, 9.0]  # the least bad first, and no more
+
+
+def test_a_baby_in_no_unit_becomes_as_large_as_most_babies(reference):
+    grown = shape_space(reference)
+    infants = infant_space(reference, grown)
+    assert of_most(_result(grown, 1.6, scale=2.0)) == pytest.approx(2.0 / 1.6)
+    assert of_most(_result(infants, 1.6, scale=2.0)) == pytest.approx(2.0 / 1.6 * infants.size)
 
 
 def test_units_are_those_of_a_head(reference):

@@ -49,7 +49,7 @@ def test_a_baby_is_not_blown_up(skin, size, unit):
 @pytest.mark.parametrize("unit", [0.004, 13.7, 3.1e5])
 @pytest.mark.parametrize("shift", [0.0, 1500.0])
 def test_landmarks_tell_the_unit(reference, skin, unit, shift):
-    """They are in mm; far from the origin, too, where a little of the size is a long way."""
+    """They are in mm; far from the origin, too."""
     turn = Rotation.random(random_state=4).as_matrix()
     places = {n: turn @ (p + shift) for n, p in reference.landmark_positions().items()}
     scan = skin.moved((skin.vertices + shift) @ turn.T / unit)

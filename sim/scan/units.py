@@ -25,7 +25,7 @@ CUSTOM = "custom"  # what one is called that is given as a number
 #: mm, the median of their distances, by which landmarks lie beside a scan that is in another unit than is thought. Those that
 #: are picked or found lie 0.5 to 3 mm from samples of its surface.
 BESIDE = 5.0
-MOST_SIZES = 20_000  # of a scan, of which one is that of its landmarks
+SIZES = 100  # of a scan that are tried to find that of its landmarks
 
 #: mm across: the least and the most that a scan of a face, a head or somebody from head to foot may be.
 LEAST, MOST = 120.0, 2600.0
@@ -109,11 +109,9 @@ def unit_of_landmarks(points: np.ndarray, landmarks: dict[str, np.ndarray], unit
 
     distance, (name, scale) = min(((away(unit[1]), unit) for unit in units), default=(np.inf, (None, None)))
     if distance > BESIDE and not told:
-        # far from the origin a little of the size is a long way
-        count = int(np.clip(np.log(MOST / LEAST) * np.abs(marks).max() / BESIDE, 100, MOST_SIZES))
-        sizes = np.geomspace(LEAST, MOST, count) / np.ptp(points, axis=0).max()
+        sizes = np.geomspace(LEAST, MOST, SIZES) / np.ptp(points, axis=0).max()
         best = int(np.argmin([away(size) for size in sizes]))
-        least, most = sizes[max(best - 1, 0)], sizes[min(best + 1, count - 1)]
+        least, most = sizes[max(best - 1, 0)], sizes[min(best + 1, SIZES - 1)]
         nearest = minimize_scalar(away, bounds=(least, most), method="bounded", options={"xatol": 1e-4 * least})
         if nearest.fun < min(BESIDE, 0.5 * distance):
             return CUSTOM, float(nearest.x)
