@@ -23,8 +23,8 @@ def face_of_any_size(mesh: Mesh, reference: Head, space: ShapeSpace, template, u
     """Work returning what a quick look sees of a face in a scan that none of ``unit_scales``, mm per unit, makes a person's: mm
     per unit with which it is as large as most, or None, and mm per unit to look at more closely, likeliest first.
 
-    Only what is plainly a whole face counts, because more is tried than where the unit is known: ten heads were .8 to
-    3.3 bad with likenesses of .73 and more, animals, machine parts and other things, 25 of them, 11 and more.
+    Only what is plainly a whole face counts, because more is tried than where the unit is known: nine heads were .8 to
+    3.3 bad with likenesses of .73 and more, babies 5.4, animals, machine parts and other things, 25 of them, 11 and more.
     """
     scales = sizes_to_try(surface_samples(mesh))
     seen = yield from portion(looked(ANY_SIZE, mesh, reference, space, template, scales, 0.9), 0.0, 0.9)
