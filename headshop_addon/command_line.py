@@ -16,7 +16,6 @@ from ..sim.errors import InputError
 
 INTERRUPTED = 130
 RELAX = ("auto", "always", "never")
-UNITS = ("mm", "cm", "m", "in")
 SETS = ("muscles", "facs", "arkit", "expressions", "rig")
 
 
@@ -97,14 +96,12 @@ def parser() -> argparse.ArgumentParser:
 
 def _unit(text: str) -> str:
     """What ``--units`` may be."""
+    from ..sim.scan.units import told_unit
+
     try:
-        known = text in UNITS or 0 < float(text) < float("inf")
-    except ValueError:
-        known = False
-    if not known:
-        raise argparse.ArgumentTypeError(
-            f"{text!r} is no unit: give mm, cm, m, in, or millimetres per unit as a number"
-        )
+        told_unit(text)
+    except InputError as error:
+        raise argparse.ArgumentTypeError(str(error).rstrip(".")) from None
     return text
 
 

@@ -75,7 +75,7 @@ def _add(context, scan, name: str) -> bpy.types.Object:
 
 def unit_is_told(scan: bpy.types.Object) -> bool:
     """Whether an artist said in which unit the ``scan`` is, so that its size is not questioned."""
-    return bool(_facts(scan).get("unit_told", True))
+    return bool(heads.read_report(scan).get("scan", {}).get("unit_told", True))
 
 
 def resize(scan: bpy.types.Object, factor: float) -> None:
@@ -83,14 +83,10 @@ def resize(scan: bpy.types.Object, factor: float) -> None:
     scan.data.transform(Matrix.Scale(factor, 4))
     for item in scan_landmarks.entries(scan).values():
         item.co, item.found = factor * Vector(item.co), factor * Vector(item.found)
-    facts = _facts(scan)
+    facts = heads.read_report(scan).get("scan", {})
     facts |= {"unit": BY_FACE, "unit_scale": factor * facts.get("unit_scale", 1.0)}
     facts["orientation"] = f"Read as {unit_words(facts['unit'], facts['unit_scale'])}."
-    scan[heads.REPORT] = json.dumps({"scan": facts})
-
-
-def _facts(scan) -> dict:
-    return json.loads(scan.get(heads.REPORT, "{}")).get("scan", {})
+    heads.write_report(scan, {"scan": facts})
 
 
 def _clear_view(context, obj) -> None:

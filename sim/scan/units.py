@@ -60,21 +60,31 @@ def plausible_units(mesh: Mesh, unit: str | float | None = None) -> dict[str, fl
 
 def units_of(points: np.ndarray, unit, called: str = CUSTOM) -> list[tuple[str, float]]:
     """(name, mm) of `plausible_units` for samples (n, 3) of a scan; ``called`` : the name of one that is given as a number."""
-    if isinstance(unit, str) and unit.strip().lower() in UNITS:
-        name = unit.strip().lower()
-        return [(name, UNITS[name])]
     if unit is not None:
-        try:
-            scale = float(unit)
-        except ValueError:
-            scale = float("nan")
-        if not 0 < scale < float("inf"):
-            raise InputError(f"{unit!r} is no unit: give mm, cm, m, in, or millimetres per unit as a number.")
-        return [(called, scale)]
+        return [told_unit(unit, called)]
     extent = np.ptp(points, axis=0).max()
     least, most = PLAUSIBLE
     units = [(name, scale) for name, scale in UNITS.items() if least <= extent * scale <= most]
     return units or [(name, scale) for name, scale in UNITS.items() if most < extent * scale <= BODY]
+
+
+def told_unit(unit: str | float, called: str = CUSTOM) -> tuple[str, float]:
+    """(name, mm) of a unit that somebody gives, by its name or in mm; ``called`` : its name in the second case.
+
+    Raises
+    ------
+    InputError : it is neither.
+    """
+    name = str(unit).strip().lower()
+    if name in UNITS:
+        return name, UNITS[name]
+    try:
+        scale = float(unit)
+    except ValueError:
+        scale = float("nan")
+    if not 0 < scale < float("inf"):
+        raise InputError(f"{unit!r} is no unit: give mm, cm, m, in, or millimetres per unit as a number.")
+    return called, scale
 
 
 def no_head(points: np.ndarray) -> InputError:
