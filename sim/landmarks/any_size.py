@@ -24,7 +24,8 @@ def face_of_any_size(mesh: Mesh, reference: Head, space: ShapeSpace, template, u
     per unit with which it is as large as most, or None, and mm per unit to look at more closely, likeliest first.
 
     Only what is plainly a whole face counts, because more is tried than where the unit is known: nine heads were .8 to
-    3.3 bad with likenesses of .73 and more, babies 5.4; 25 animals, machine parts and other things 11 and more in a longer look.
+    3.3 bad with likenesses of .73 and more, babies 5.4; 25 animals, machine parts and other things 11 and more, in a
+    longer look.
     """
     scales = sizes_to_try(surface_samples(mesh))
     seen = yield from portion(looked(ANY_SIZE, mesh, reference, space, template, scales, 0.9), 0.0, 0.9)
