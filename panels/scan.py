@@ -46,10 +46,12 @@ def _facts(layout, context, scan):
     size = max(scan.dimensions) * 1000
     column.label(text=f"{len(scan.data.polygons):,} faces, {size:.0f} mm", icon="MESH_DATA")
     if "unit" in facts:
-        unit = facts["unit"] if facts["unit"] in UNITS else f"1 unit = {facts['unit_scale']:.4g} mm"
-        column.label(text=f"Read as {unit}, {facts['up']} up, facing {facts['front']}", icon="ORIENTATION_GLOBAL")
-        if facts["unit"] == BY_FACE:
-            column.label(text="Size guessed from the face", icon="FIXED_SIZE")
+        unit, axes = facts["unit"], f"{facts['up']} up, facing {facts['front']}"
+        usual = unit in UNITS
+        column.label(text=f"Read as {unit}, {axes}" if usual else f"Read as {axes}", icon="ORIENTATION_GLOBAL")
+        if not usual:
+            told = ", by the face" if unit == BY_FACE else ""
+            column.label(text=f"1 unit = {facts['unit_scale']:.3g} mm{told}", icon="FIXED_SIZE")
     removed = sum(facts.get(kind, 0) for kind in _FAULTS)
     if removed:
         column.label(text=f"{removed:,} faulty elements removed", icon="BRUSH_DATA")

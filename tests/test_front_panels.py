@@ -153,6 +153,10 @@ def test_how_the_file_was_read_is_shown_and_doubt_is_said(addon, scan):
     assert "Read as m, +Y up, facing +Z" in text and "9 faulty" in text and "Unsure" not in text
     scan[heads.REPORT] = json.dumps({"scan": facts | {"certain": False}})
     assert "Unsure" in _text(draw_all(addon), "scan")
+    for unit, said in (("face", "1 unit = 71.8 mm, by the face"), ("custom", "1 unit = 71.8 mm")):
+        scan[heads.REPORT] = json.dumps({"scan": facts | {"unit": unit, "unit_scale": 71.787}})
+        text = _text(draw_all(addon), "scan")
+        assert said in text and "Read as +Y up, facing +Z" in text and ("by the face" in text) == (unit == "face")
 
 
 def test_a_head_shows_every_slider_once_and_every_expression(addon, reference):
