@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.ndimage import gaussian_filter
+from scipy.signal import correlate
 from scipy.spatial import cKDTree
 
 from ..adapt.completion import complete_positions
@@ -218,14 +219,12 @@ def _responses(maps: Canonical, pattern: Canonical, names, rows, columns, reach)
         window = window * trust_generic[np.ix_(i, j)]
         big = np.arange(-half - reach, half + reach + 1)
         i, j = np.clip(i0 + big, 0, h - 1), np.mod(j0 + big, w)
-        view = np.lib.stride_tricks.sliding_window_view
-        around = view(mine[np.ix_(i, j)], (2 * half + 1, 2 * half + 1), axis=(0, 1))  # (s, s, 4, p, p)
-        weight = view(trust[np.ix_(i, j)], (2 * half + 1, 2 * half + 1)) * window  # (s, s, p, p)
-        cross = np.einsum("xycab,xyab,abc->xyc", around, weight, ours, optimize=True)
-        own = np.einsum("xycab,xyab->xyc", around**2, weight)
-        other = np.einsum("abc,xyab->xyc", ours**2, weight)
-        like = cross.sum(axis=2) / np.sqrt(np.maximum(own.sum(axis=2) * other.sum(axis=2), 1e-12))
-        out[k] = like * weight.sum(axis=(2, 3)) / max(window.sum(), 1e-9)
+        around, there = mine[np.ix_(i, j)], trust[np.ix_(i, j)]
+        cross = correlate(around * there[..., None], ours * window[..., None], "valid", "fft")[..., 0]
+        own = correlate((around**2).sum(axis=2) * there, window, "valid", "fft")
+        other, weight = (correlate(there, x, "valid", "fft") for x in (window * (ours**2).sum(axis=2), window))
+        like = cross / np.sqrt(np.maximum(own * other, 1e-12))
+        out[k] = like * weight / max(window.sum(), 1e-9)
     return out
 
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from ..anatomy.head import Head
 from ..anatomy.storage import reference_head
+from ..blas import on_one_thread
 from ..cylindrical.second_opinion import weighed
 from ..mesh import Mesh
 from ..progress import Progress, Work, portion
@@ -74,6 +75,11 @@ def find_landmarks(mesh: Mesh, reference: Head | None = None, unit_scales=(1.0,)
     ------
     InputError : there is no face in it.
     """
+    return on_one_thread(_finding(mesh, reference, unit_scales, any_size))
+
+
+def _finding(mesh: Mesh, reference: Head | None, unit_scales, any_size: bool) -> Work:
+    """`find_landmarks`."""
     yield Progress(0.0, LOOKING)
     reference = reference or reference_head()
     space = shape_space(reference)

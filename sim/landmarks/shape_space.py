@@ -17,6 +17,7 @@ from scipy.spatial import cKDTree
 from ..adapt.shut_eyes import with_shut_eyes
 from ..anatomy.head import Head
 from ..anatomy.landmark_names import SKIN
+from ..blas import one_thread
 from ..mesh_subdivision import drawn
 from ..relax.responses import answers, responses
 from ..scan.individual import variation
@@ -115,6 +116,12 @@ class ShapeSpace:
 @lru_cache(maxsize=2)
 def shape_space(head: Head) -> ShapeSpace:
     """The shape space of a head at rest, made once."""
+    with one_thread():
+        return _made(head)
+
+
+def _made(head: Head) -> ShapeSpace:
+    """`shape_space`."""
     skin = head.skin
     whole = drawn(skin.faces, skin.vertices)
     inner = head.groups["inner"] > 0.5
