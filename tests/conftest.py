@@ -122,9 +122,11 @@ def laid():
 
 @pytest.fixture
 def one_look(monkeypatch):
-    """Faces are looked for once, quickly, so that a scan without any is soon refused."""
-    from headshop.sim.landmarks import looks, placed_face
+    """Faces are looked for once, quickly, and in one size, so that a scan without any is soon refused."""
+    from headshop.sim.landmarks import any_size, looks, placed_face
+    from headshop.sim.scan.units import sizes_to_try
 
+    monkeypatch.setattr(any_size, "sizes_to_try", lambda samples: sizes_to_try(samples)[:1])
     monkeypatch.setattr(placed_face, "LOOKS", looks.LOOKS[:1])
     monkeypatch.setattr(placed_face, "PARTS", looks.PARTS[:1])
 
