@@ -58,6 +58,7 @@ NO_SKIN = (
     ("FLAT_ENDS", "Flat Ends", "Leave out where tomography stops or a bust stands on its base"),
     ("HELD_BY_LIPS", "Held by Lips", "Leave out what the lips hold, such as a breathing tube"),
     ("HAIR", "Hair", "Leave out hair of the head; the scalp is invented below it"),
+    ("GLASSES", "Glasses", "Leave out glasses; what they hide is invented"),
 )
 
 

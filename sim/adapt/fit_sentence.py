@@ -23,6 +23,7 @@ LEFT_OUT = {
     "flat_ends": "a flat end",
     "held_by_lips": "what the lips hold",
     "hair": "hair",
+    "glasses": "glasses",
 }
 #: What is advised where a face whose lips are closed seems to smile.
 SMILES_CLOSED = (

@@ -14,6 +14,7 @@ from ..progress import Progress, Work, portion
 from ..scan.depth_jumps import depth_jumps
 from .confidence import judge, judge_together, like_ears, sure_as_corners
 from .expression import fit_expression, line_of, meeting_lids, outline_of
+from .glasses import fit_without_glasses, glasses_seen
 from .infant import with_mouth_in_place
 from .looking import run
 from .picked import picked
@@ -88,7 +89,9 @@ def _finding(mesh: Mesh, reference: Head | None, unit_scales, any_size: bool) ->
     yield Progress(0.05, LOOKING)
     placing = place_face(mesh, reference, space, unit_scales, any_size)
     scale, fit, target, space = yield from portion(placing, 0.05, 0.75)
-    fit = yield from portion(with_likelier_ears(space, target, fit), 0.75, 0.8)
+    fit = yield from portion(with_likelier_ears(space, target, fit), 0.75, 0.79)
+    fit, telling = yield from run(fit_without_glasses(space, target, fit), 0.79, 0.8, "Looking for glasses")
+    target = target if telling is None else target.without(glasses_seen(space, telling, target))
     whole = space
     fit, space = yield from run(with_unseen_jaw(space, target, fit), 0.8, 0.81, "Looking for the mouth")
     if space.of_infants:

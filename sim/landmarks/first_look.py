@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A first look at a scan with the landmarks given: a plausible head laid on it tells what they do not.
 
-Where lids are, what hangs out of the mouth and is no skin, and what is hair.
+Where lids are, what hangs out of the mouth and is no skin, what are glasses, and what is hair.
 """
 
 from collections.abc import Collection
@@ -19,6 +19,7 @@ from ..progress import Work
 from ..relax.mouth_gap import MARKS
 from .confidence import in_mid_air
 from .expression import fit_expression
+from .glasses import BEFORE_SKIN, fit_without_glasses, glasses_seen
 from .held_by_lips import held_by_lips
 from .hidden_skin import UNSEEN, hidden_skin, unseen_face, unseen_scalp, with_hidden_skin
 from .infant import likelier_space, with_mouth_in_place
@@ -35,21 +36,22 @@ LOOKING = "Looking at lids and lips"
 #: Landmarks about which skin is much the same, so that a plausible head does not tell where they are.
 UNTOLD = ("tr", "eu")
 BESIDE_FACE = 11.0  # mm from the face's outline: what lies within and may be skin is as scanned
+KINDS = ("held_by_lips", "hair", "glasses")  # of `NO_SKIN`, those that a face tells
 FEWEST = 4  # landmarks that tell where the head is
 
 
 @dataclass(frozen=True, eq=False)
 class FirstLook:
     """landmarks : name -> (3,) mm, those given and those of lids that are seen; lips : about where their landmarks are if
-    they are parted, if only a little, or None; target : the scan without what the lips hold and hair; left_out : how much of
-    it that is, mm²; filled : with skin behind it, and where it lacks the scalp, as that probably is; hidden (k,) : vertices of
-    the reference's skin that make that up; guessed : name -> (3,) mm, about where others are."""
+    they are parted, if only a little, or None; target : the scan without what the lips hold, hair and glasses; left_out : how
+    much of it that is, mm²; filled : with skin behind it, and where it lacks the scalp, as that probably is; hidden (k,) :
+    vertices of the reference's skin that make that up; guessed : name -> (3,) mm, about where others are."""
 
     landmarks: dict[str, np.ndarray]
     target: Surface
     filled: Surface
     lips: dict[str, np.ndarray] | None = None
-    left_out: dict[str, float] = field(default_factory=lambda: {"held_by_lips": 0.0, "hair": 0.0})
+    left_out: dict[str, float] = field(default_factory=lambda: dict.fromkeys(KINDS, 0.0))
     hidden: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
     guessed: dict[str, np.ndarray] = field(default_factory=dict)
 
@@ -71,7 +73,7 @@ def first_look(
 ) -> Work:
     """Work returning the `FirstLook` at the scan ``target`` with the landmarks ``given`` (name -> (3,) mm).
 
-    leave_out : of `NO_SKIN`; what the lips hold, or hair, is taken for skin where it is not among them
+    leave_out : of `NO_SKIN`; what the lips hold, glasses, or hair, is taken for skin where it is not among them
     found : names of those given that nobody picked: in mid-air they are guesses, and of an infant they tell nothing
     """
     rest = reference.landmark_positions()
@@ -86,10 +88,17 @@ def first_look(
     space = likelier_space(reference, space, pose.scale, clear)
     if space.of_infants:
         told = _told_of(space, pose, {n: p for n, p in clear.items() if n not in found})
-    target = facing_out(space, target, pose)
+    target = whole = facing_out(space, target, pose)
     coarse, jaw_told = target.coarser(), any(name in given for name in JAW)
     try:
-        fit = yield from run(fit_shape(space, coarse, pose, told=told), 0.0, 0.55, LOOKING)
+        fit = yield from run(fit_shape(space, coarse, pose, told=told), 0.0, 0.5, LOOKING)
+        worn = np.zeros(len(target.triangles), dtype=bool)
+        if "glasses" in leave_out:
+            fit, telling = yield from run(fit_without_glasses(space, coarse, fit), 0.5, 0.55, LOOKING)
+            worn = worn if telling is None else glasses_seen(space, telling, target)
+        glasses = target.vertices[target.triangles[worn].ravel()]
+        target = target.without(worn) if worn.any() else target
+        coarse = target.coarser() if worn.any() else coarse
         if not jaw_told:
             fit, space = yield from run(with_unseen_jaw(space, coarse, fit), 0.55, 0.58, LOOKING)
         if space.of_infants:
@@ -100,7 +109,7 @@ def first_look(
         known = {n: given[n] for n in np.array(skull)[off]}
         hair = yield from run(fit_under_hair(space, coarse, fit, shown, given, known), 0.9, 1.0, LOOKING)
     except NoFaceError:
-        return FirstLook(given, target, target)
+        return FirstLook(given, whole, whole)
     landmarks = given | lids_told(space, fit, shown, coarse, given)
     laid = space.landmarks(fit.points)
     lips = {name: laid[name] for name in MARKS} if shown.parted else None
@@ -119,6 +128,7 @@ def first_look(
     shows = hair_over(space, hair.fit, target, covered)
     left = target.without(held | shows)
     hidden = hidden_skin(space, fit, target.vertices[target.triangles[held].ravel()], left)
+    hidden |= hidden_skin(space, fit, glasses, left, BEFORE_SKIN)
     if not jaw_told:
         hidden |= unseen_jaw(space, fit, left)
     picks = np.reshape([given[n] for n in names if n not in found], (-1, 3))
@@ -128,7 +138,8 @@ def first_look(
     filled = with_hidden_skin(space, hair.fit, covered & no_ear, filled)
     unseen = unseen_scalp(space, hair.scalp, left) & ~covered & (not kept)  # what lies far below hair is not unseen
     filled = with_hidden_skin(space, hair.scalp, unseen & no_ear, filled, UNSEEN)
-    out = {"held_by_lips": float(target.area[held].sum()), "hair": float(target.area[shows].sum())}
+    areas = (target.area[held].sum(), target.area[shows].sum(), whole.area[worn].sum())
+    out = dict(zip(KINDS, map(float, areas), strict=True))
     return FirstLook(landmarks, left, filled, lips, out, space.vertices[hidden | covered | unseen], guessed)
 
 

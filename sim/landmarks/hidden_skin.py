@@ -30,13 +30,13 @@ ROUGH = 0.5  # mm: deviation of each height
 ALIKE = 0.8  # correlation of left and right
 
 
-def hidden_skin(space: ShapeSpace, fit: ShapeFit, things, left: Surface) -> np.ndarray:
-    """(n,) bool: the points of the skin that lie behind ``things`` (k, 3) mm and that the scan without those, ``left``, does
-    not show."""
+def hidden_skin(space: ShapeSpace, fit: ShapeFit, things, left: Surface, behind: float = BEHIND) -> np.ndarray:
+    """(n,) bool: the points of the skin that lie up to so far ``behind`` ``things`` (k, 3) mm, and that the scan without those,
+    ``left``, does not show."""
     if len(things) == 0:
         return np.zeros(len(fit.points), dtype=bool)
     _, trust, _ = pairs(space, fit.points, left, SEEN * fit.pose.scale)
-    return (trust == 0) & (cKDTree(things).query(fit.points)[0] < BEHIND * fit.pose.scale)
+    return (trust == 0) & (cKDTree(things).query(fit.points)[0] < behind * fit.pose.scale)
 
 
 def unseen_scalp(space: ShapeSpace, fit: ShapeFit, target: Surface) -> np.ndarray:
