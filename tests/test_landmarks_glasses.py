@@ -200,6 +200,16 @@ def test_one_lens_or_a_bare_face_is_no_pair_of_glasses(reference, face, marks, l
         assert same is fit and telling is None
 
 
+def test_glasses_with_too_little_of_a_face_beside_them_are_not_told(reference, face, frames, marks, laid):
+    vertices, triangles = face
+    middle = (marks["en_l"] + marks["en_r"]) / 2
+    near = (np.linalg.norm(vertices - middle, axis=1) < 40)[triangles].all(axis=1)
+    scan = Surface(*_joined((vertices, triangles[near]), frames), smooth=2.0)
+    space = shape_space(reference)
+    fit = laid(space, space.points)
+    assert finish(_as_work(fit_without_glasses(space, scan, fit))) == (fit, None)
+
+
 def test_a_head_of_any_size(reference, face, frames, laid):
     space, size = shape_space(reference), 0.8
     fit = laid(space, size * space.points)
