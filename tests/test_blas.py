@@ -84,3 +84,19 @@ def test_a_skin_is_fitted_on_one_thread(monkeypatch):
     monkeypatch.setattr(skin_fit, "_fitting", fitting)
     finish(skin_fit.fit_skin(None, None, {}))
     assert seen == [{1}]
+
+
+def test_landmarks_are_found_on_one_thread(monkeypatch):
+    from headshop.sim.landmarks import find, shape_space
+
+    seen = []
+
+    def finding(*_):
+        seen.append(counts())
+        yield Progress(0.5, "Half")
+
+    monkeypatch.setattr(find, "_finding", finding)
+    monkeypatch.setattr(shape_space, "_made", lambda head: seen.append(counts()))
+    finish(find.find_landmarks(None))
+    shape_space.shape_space.__wrapped__(None)
+    assert seen == [{1}, {1}]

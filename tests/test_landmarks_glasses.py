@@ -25,7 +25,7 @@ from headshop.sim.scan.clean import clean_scan
 from headshop.sim.scan.individual import individual
 from headshop.sim.scan.ply import read_ply
 
-WIDE, HIGH, RADIUS, GAP = 25.0, 18.0, 2.0, 18.0  # mm: half of a frame, half its thickness, from the eyes' corners to it
+WIDE, HIGH, RADIUS, GAP = 25.0, 18.0, 2.0, 18.0  # mm: half of a frame and of its thickness, to it from the eyes
 AROUND, ALONG = 10, 64
 
 
@@ -72,7 +72,7 @@ def _lens(marks, side, gap=GAP):
     line = _outline(marks, side, gap)
     rings = np.linspace(1, 0, 12)[:-1, None, None]
     dome = (1 - rings**2) * [0.0, -2.0, 0.0]
-    vertices = np.concatenate([(line.mean(axis=0) + rings * (line - line.mean(axis=0)) + dome).reshape(-1, 3)])
+    vertices = (line.mean(axis=0) + rings * (line - line.mean(axis=0)) + dome).reshape(-1, 3)
     k = np.arange(len(vertices)).reshape(-1, ALONG)
     a, b, c, d = k[:-1], k[1:], np.roll(k[1:], -1, axis=1), np.roll(k[:-1], -1, axis=1)
     triangles = np.concatenate([np.stack(t, axis=-1).reshape(-1, 3) for t in ((a, b, c), (a, c, d))])
@@ -88,8 +88,8 @@ def _outward(vertices, triangles, middle):
 
 def _joined(*meshes):
     """One mesh of several, vertices and triangles."""
-    counts = np.cumsum([0, *(len(vertices) for vertices, _ in meshes)])
-    triangles = [triangles + count for (_, triangles), count in zip(meshes, counts, strict=False)]
+    before = np.cumsum([len(vertices) for vertices, _ in meshes]) - [len(vertices) for vertices, _ in meshes]
+    triangles = [triangles + count for (_, triangles), count in zip(meshes, before, strict=True)]
     return np.concatenate([vertices for vertices, _ in meshes]), np.concatenate(triangles)
 
 

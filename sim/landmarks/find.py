@@ -91,7 +91,7 @@ def _finding(mesh: Mesh, reference: Head | None, unit_scales, any_size: bool) ->
     scale, fit, target, space = yield from portion(placing, 0.05, 0.75)
     fit = yield from portion(with_likelier_ears(space, target, fit), 0.75, 0.79)
     fit, telling = yield from run(fit_without_glasses(space, target, fit), 0.79, 0.8, "Looking for glasses")
-    target = target if telling is None else target.without(glasses_seen(space, telling, target))
+    target = target.without(glasses_seen(space, telling, target))
     whole = space
     fit, space = yield from run(with_unseen_jaw(space, target, fit), 0.8, 0.81, "Looking for the mouth")
     if space.of_infants:

@@ -92,13 +92,14 @@ def first_look(
     coarse, jaw_told = target.coarser(), any(name in given for name in JAW)
     try:
         fit = yield from run(fit_shape(space, coarse, pose, told=told), 0.0, 0.5, LOOKING)
-        worn = np.zeros(len(target.triangles), dtype=bool)
+        telling = None
         if "glasses" in leave_out:
             fit, telling = yield from run(fit_without_glasses(space, coarse, fit), 0.5, 0.55, LOOKING)
-            worn = worn if telling is None else glasses_seen(space, telling, target)
+        worn = glasses_seen(space, telling, target)
         glasses = target.vertices[target.triangles[worn].ravel()]
-        target = target.without(worn) if worn.any() else target
-        coarse = target.coarser() if worn.any() else coarse
+        if worn.any():
+            target = target.without(worn)
+            coarse = target.coarser()
         if not jaw_told:
             fit, space = yield from run(with_unseen_jaw(space, coarse, fit), 0.55, 0.58, LOOKING)
         if space.of_infants:

@@ -2,16 +2,15 @@
 """Glasses, their lenses too where a scanner sees those and not through them: they stand off the face before both eyes.
 
 Lenses take up so much of a face that a plausible head laid on the scan (`shape_fit`) is drawn toward them. Once it is seen
-that there are glasses, it is laid on what lies farther from them, and tells what of the rest is skin.
+that there are glasses, it is laid on what lies beside them, and tells what of the rest is skin.
 """
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from ..adapt.closest import Surface
 from .shape_fit import CHANGE, Expression, NoFaceError, ShapeFit, fit_shape, part_of
 from .shape_space import ShapeSpace
-from .things import REACH, pieces, standing_off, things
+from .things import REACH, high_pieces, standing_off, things
 
 #: mm, all on a head of the reference's size. Frames and lenses of six kinds on the faces of five people, made up and scanned by
 #: virtual devices, stand off by 9 and more, over 110 mm² of more than 4 at each eye; 23 faces without any by at most 5 over
@@ -23,7 +22,6 @@ LEAST = 75.0  # mm² of each eye's that do so
 ANY = 40.0  # mm² of a piece of them
 SIDES = 12.0  # before the ears' canals, at which their sides are given up
 BEFORE_SKIN = 20.0  # to which they hide skin behind them
-BLIND = 12.0  # about them, what is not heeded to tell what of the rest is skin
 #: As the reference's eyes: where nothing shows the lids, the skin around them would open or shut them anyhow.
 OPEN = Expression(wide=True)
 
@@ -45,8 +43,10 @@ def fit_without_glasses(space: ShapeSpace, target: Surface, fit: ShapeFit):
         return fit, None
 
 
-def glasses_seen(space: ShapeSpace, telling: ShapeFit, target: Surface) -> np.ndarray:
-    """(m,) bool: the triangles of ``target`` that show glasses, as a fit that is ``telling`` of them has it."""
+def glasses_seen(space: ShapeSpace, telling: ShapeFit | None, target: Surface) -> np.ndarray:
+    """(m,) bool: the triangles of ``target`` that show glasses, as a fit that is ``telling`` of them has it; None: none do."""
+    if telling is None:
+        return np.zeros(len(target.triangles), dtype=bool)
     size, marks = telling.pose.scale, space.landmarks(telling.points)
     middle = np.mean([marks[f"{name}_{side}"] for name in ("en", "ex") for side in "lr"], axis=0)
     ears = np.mean([marks[f"t_{side}"] for side in "lr"], axis=0)
@@ -63,27 +63,18 @@ def glasses_seen(space: ShapeSpace, telling: ShapeFit, target: Surface) -> np.nd
 
 
 def about_glasses(space: ShapeSpace, fit: ShapeFit, target: Surface) -> np.ndarray:
-    """(n,) bool: the vertices of ``target`` about what stands plainly off the face laid on it at both eyes, and in between,
-    where lenses are; else none."""
+    """(n,) bool: the vertices of ``target`` as far about both eyes as something stands plainly off the face laid on it; none if
+    it does not at both."""
     size, marks = fit.pose.scale, space.landmarks(fit.points)
     every = np.zeros(len(target.vertices), dtype=bool)
     for side in "lr":
         middle = (marks[f"en_{side}"] + marks[f"ex_{side}"]) / 2
-        x, y, z = place = ((target.vertices - middle) @ fit.pose.turn / size).T
+        x, y, z = ((target.vertices - middle) @ fit.pose.turn / size).T
         window = (np.abs(x) < BESIDE) & (np.abs(z) < ACROSS) & (-BEFORE < y) & (y < BEHIND)
         near = np.flatnonzero(window & ((x / EYE[0]) ** 2 + (z / EYE[1]) ** 2 > 1))
-        off = standing_off(space, fit, target, near, _anywhere)
-        piece, area = pieces(target, off > PLAINLY)
-        top = np.zeros(len(area))
-        np.maximum.at(top, piece, off)
-        high = (top > HIGH) & (area > ANY * size**2)
-        if area[high].sum() < LEAST * size**2:
+        high = high_pieces(target, standing_off(space, fit, target, near), PLAINLY, HIGH, ANY * size**2)
+        if target.area[high[target.triangles].all(axis=1)].sum() < LEAST * size**2:
             return np.zeros_like(every)
-        seen = place[:, high[piece] & (off > PLAINLY)]
-        every |= window & (np.abs(x) < np.abs(seen[0]).max()) & (seen[2].min() < z) & (z < seen[2].max())
-        every |= cKDTree(seen.T).query(place.T)[0] < BLIND
+        wide, low, up = np.abs(x[high]).max(), z[high].min(), z[high].max()
+        every |= window & (np.abs(x) <= wide) & (low <= z) & (z <= up)
     return every
-
-
-def _anywhere(points):
-    return np.ones(len(points), dtype=bool)

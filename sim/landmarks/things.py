@@ -23,10 +23,7 @@ def things(target: Surface, near, off, size: float, high: float, least: float) -
     near (k,) : those that are looked at; off (n,) mm by which each stands off the skin, on a head of the reference's size
     size : of this head, of the reference's; high : mm that a thing stands off somewhere; least : mm² of it
     """
-    piece, area = pieces(target, off > OFF)
-    top = np.zeros(len(area))
-    np.maximum.at(top, piece, off)
-    some = ((top > high) & (area > least * size**2))[piece] & (off > OFF)
+    some = high_pieces(target, off, OFF, high, least * size**2)
     if some.any():
         apart = np.full(len(off), np.inf)
         apart[near] = cKDTree(target.vertices[some]).query(target.vertices[near])[0] / size
@@ -36,6 +33,15 @@ def things(target: Surface, near, off, size: float, high: float, least: float) -
         some = whole[piece]
         some[near] = cKDTree(target.vertices[some]).query(target.vertices[near])[0] <= BESIDE * size
     return some
+
+
+def high_pieces(target: Surface, off, by: float, high: float, least: float) -> np.ndarray:
+    """(n,) bool: the vertices of ``target`` in pieces that stand off by more than ``by`` mm, somewhere by more than ``high``,
+    and are larger than ``least`` mm². ``off`` (n,) mm by which each stands off."""
+    piece, area = pieces(target, off > by)
+    top = np.zeros(len(area))
+    np.maximum.at(top, piece, off)
+    return ((top > high) & (area > least))[piece] & (off > by)
 
 
 def pieces(target: Surface, some):
@@ -49,16 +55,18 @@ def pieces(target: Surface, some):
     return piece, np.bincount(piece[a], target.area[inside], count)
 
 
-def standing_off(space: ShapeSpace, fit: ShapeFit, target: Surface, near, inside) -> np.ndarray:
+def standing_off(space: ShapeSpace, fit: ShapeFit, target: Surface, near, inside=None) -> np.ndarray:
     """(n,) mm, on a head of the reference's size, by which the vertices of ``target`` stand off the skin laid on it.
 
     near (k,) : those that are looked at; inside : whether they are where such a thing may be, of their feet (k, 3) mm on
-    the skin. Elsewhere 0. Before an opening of the skin, as between parted lips, they stand off its edge, forward.
+    the skin (None: all are). Elsewhere 0. Before an opening of the skin, as between parted lips, they stand off its edge,
+    forward.
     """
     out, size, forward = np.zeros(len(target.vertices)), fit.pose.scale, -fit.pose.turn[:, 1]
     points = target.vertices[near]
     found = Surface(fit.points, space.triangles).closest(points, REACH * size)
     way = np.where(found.border[:, None], forward, found.normals)
     height = np.einsum("ij,ij->i", points - np.nan_to_num(found.points), way) / size
-    out[near] = np.where(found.found & inside(found.points), height, 0.0)
+    there = found.found if inside is None else found.found & inside(found.points)
+    out[near] = np.where(there, height, 0.0)
     return out
