@@ -109,7 +109,7 @@ def _finding(mesh: Mesh, reference: Head | None, unit_scales, any_size: bool) ->
     bare = target.without(hair_over(space, fit, target, hair.covered & ~in_face(space, fit, {}, 0.0)))
     seen = Mesh.from_triangles(bare.vertices, bare.triangles)
     other = yield from portion(weighed(seen, positions, confidence, reference, bare), 0.9, 1.0)
-    if telling is not None:  # where glasses hide eyes, the map is of nothing
+    if telling is not None:  # over holes as wide as lenses a relaxed map tells less than the shape, over others as much
         other |= {n: positions[n] for n in mid_air}
     positions = better_of(positions, other, shown.parted or space is not whole, fit.pose.scale)
     lids = meeting_lids(space, fit, target, shown.shut) | shown.lids
