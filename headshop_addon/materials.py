@@ -16,6 +16,7 @@ from .anatomy_materials import FIBRE, REST, anatomy_material
 from .detail_images import images_of
 from .eye_materials import EYE, IRIS, IRIS_COLOUR, eye_material
 from .scan_colour import ScanColour, colour_image, iris_colour, unseen_skin
+from .scan_texture import with_pictures
 from .skin_material import COLOUR, skin_material
 from .skin_paint import paint_skin, write_vectors
 
@@ -40,7 +41,8 @@ def dressing(skin: bpy.types.Object) -> Work:
     head = heads.read_head(skin)
     axes = head_axes(head)
     scan = _coloured_scan(skin)
-    iris = None if scan is None else iris_colour(scan, head.eyes)
+    seen = None if scan is None else ScanColour(scan, head.parts["skin"].vertices)
+    iris = None if seen is None else iris_colour(seen.scan, head.eyes)
     objects = heads.parts_of(skin)
     for part, obj in objects.items():
         mesh = head.parts[part]
@@ -49,7 +51,7 @@ def dressing(skin: bpy.types.Object) -> Work:
             yield Progress(0.1, "Painting the skin")
             paint_skin(obj, mesh, head.groups, place, {n: axes @ p for n, p in head.landmark_positions().items()})
             unseen = unseen_skin(mesh, head.groups["inner"], bridge.read_attribute(skin.data, "hidden"))
-            own = yield from portion(_own_skin(skin, mesh, scan, unseen), 0.2, 0.85)
+            own = yield from portion(_own_skin(skin, mesh, seen, unseen), 0.2, 0.85)
             yield Progress(0.85, "Dressing the head")
         elif part in ("eye_l", "eye_r"):
             write_vectors(obj.data, EYE, eye_coordinates(mesh, head.eyes[part == "eye_r"], axes[2]))
@@ -83,19 +85,19 @@ def _coloured_scan(skin: bpy.types.Object) -> Mesh | None:
     if scan is None:
         return None
     bpy.context.view_layer.update()  # matrix_world of objects that were just made
-    seen = bridge.object_to_mesh(scan)
+    seen = with_pictures(bridge.object_to_mesh(scan), scan)
     if seen.colour is None or not len(seen.faces):
         return None
     matrix = np.array(skin.matrix_world.inverted() @ scan.matrix_world)
     return seen.moved(seen.vertices @ matrix[:3, :3].T + matrix[:3, 3] / bridge.METRES)
 
 
-def _own_skin(skin: bpy.types.Object, mesh: Mesh, scan: Mesh | None, unseen: np.ndarray) -> Work:
+def _own_skin(skin: bpy.types.Object, mesh: Mesh, seen: ScanColour | None, unseen: np.ndarray) -> Work:
     """Work returning a skin material of the head's own with its scan's colours and fine detail; None if there is
     neither."""
     name, image = heads.head_name(skin), None
-    if scan is not None:
-        painted = yield from colour_image(mesh, ScanColour(scan), unseen, f"{name} Colour")
+    if seen is not None:
+        painted = yield from colour_image(mesh, seen, unseen, f"{name} Colour")
         if painted is not None:
             image, colour = painted
             write_vectors(skin.data, COLOUR, np.column_stack([colour, np.ones(len(colour))]))

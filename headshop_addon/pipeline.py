@@ -22,6 +22,7 @@ from .detail_images import packing
 from .materials import dressing
 from .provenance import timed, versions
 from .scan_import import datablocks, read_scan
+from .scan_texture import put_pictures
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,6 +104,7 @@ def load_scan_alone(path, unit: str | None = None, up: str | None = None) -> Wor
 def add_scan(scan: Scan, name: str, scene: bpy.types.Scene | None = None) -> bpy.types.Object:
     """Put a scan into the scene as an object at the origin, in metres."""
     obj = bridge.mesh_to_object(scan.mesh, name)
+    put_pictures(obj, scan.mesh)
     obj[heads.PART] = "scan"
     heads.write_report(obj, {"scan": scan.report})
     (scene or bpy.context.scene).collection.objects.link(obj)

@@ -13,13 +13,16 @@ from scipy.spatial import cKDTree
 from ..sim.mesh import Mesh, vertex_normals
 from ..sim.progress import Progress, Work
 from ..sim.scan.specks import specks
+from ..sim.scan.texture import has_pictures, strewn, texel_size
 from .skin_paint import adjacency, smoothed, spread
 
 NEIGHBOURS = 4
 BLOCK = 60_000  # texels painted between two steps of progress
 #: mm beyond the scan's own spacing within which its colour counts fully, and beyond which it does not count
 NEAR, FAR = 1.5, 4.0
-SIZE = 768  # pixels: texels of about 0.7 mm, finer than most scans
+SIZE, TEXEL = 768, 0.7  # pixels, and mm that one is large about: finer than most scans
+#: Of a scan with pictures on it: pixels of the finest image, and mm between the points at which those are looked at, at least.
+LARGE, FINE = 2048, 0.3
 EVENING = 0.55  # how much of the broad shading is taken out
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
@@ -38,12 +41,21 @@ class ScanColour:
     """A scan's colours, to be asked for at points near its surface.
 
     scan : Mesh in mm, with colours, standing where the skin stands
+    about (k, 3) mm : of a scan with pictures on it, only what is near these points is looked at (None: all of it)
+
+    It has the ``scan``; where pictures on it show more than its vertices, as points between those; and the ``size`` in pixels
+    of an image that shows all of it.
     """
 
-    def __init__(self, scan: Mesh):
-        whole = ~specks(scan)
+    def __init__(self, scan: Mesh, about: np.ndarray | None = None):
+        whole, normals = ~specks(scan), vertex_normals(scan.vertices, scan.triangles)
+        self.size = SIZE
+        if has_pictures(scan):
+            scan, normals, spacing = _between_vertices(scan, whole, about)
+            whole, self.size = slice(None), _size_for(spacing)
         points = scan.vertices[whole]
-        self.normals = vertex_normals(scan.vertices, scan.triangles)[whole]
+        self.scan = scan
+        self.normals = normals[whole]
         self.colour = to_linear(np.asarray(scan.colour, dtype=float)[whole])
         self.tree = cKDTree(points)
         some = points[:: max(len(points) // 2000, 1)]
@@ -51,7 +63,9 @@ class ScanColour:
 
     def at(self, points: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Linear colours (k, 3) and confidences (k,) 0..1 at points (k, 3) mm of a surface with normals (k, 3)."""
-        distance, index = self.tree.query(points, k=NEIGHBOURS, workers=-1)
+        reach = self.spacing + FAR  # what is farther does not count, and takes long to find
+        distance, index = self.tree.query(points, k=NEIGHBOURS, distance_upper_bound=reach, workers=-1)
+        index = np.minimum(index, len(self.colour) - 1)  # where nothing is in reach, at an infinite distance
         # what faces another way is the other side of something thin, such as an ear
         facing = np.clip(np.einsum("knj,kj->kn", self.normals[index], normals) * 2 - 0.2, 0, 1)
         weight = facing / (distance + 0.3 * self.spacing) ** 2
@@ -60,6 +74,24 @@ class ScanColour:
         near = self.spacing + NEAR
         confidence = np.clip((near + FAR - NEAR - distance[:, 0]) / (FAR - NEAR), 0, 1) * facing.max(axis=1)
         return colour, confidence
+
+
+def _between_vertices(scan: Mesh, whole: np.ndarray, about: np.ndarray | None):
+    """Points (k, 3) with colours all over the ``whole`` (n,) bool of a scan with pictures on it, as a `Mesh` without faces, its
+    normals there (k, 3), and mm that the points are apart: as far as the pictures' texels, within reason."""
+    chosen = whole[scan.triangles].all(axis=1)
+    if about is not None:
+        low, high = about.min(axis=0) - FAR, about.max(axis=0) + FAR
+        chosen &= ((scan.vertices > low) & (scan.vertices < high)).all(axis=1)[scan.triangles].any(axis=1)
+    spacing = float(np.clip(texel_size(scan, chosen), FINE, TEXEL))
+    points, normals, colour = strewn(scan, spacing, chosen)
+    return Mesh(points, np.zeros((0, 4), np.int32), colour=colour), normals, spacing
+
+
+def _size_for(spacing: float) -> int:
+    """Pixels of an image that shows what is ``spacing`` mm apart: `SIZE`, or a power of two up to `LARGE`."""
+    wanted = SIZE * TEXEL / spacing
+    return SIZE if wanted <= SIZE else min(2 ** int(np.ceil(np.log2(wanted))), LARGE)
 
 
 def iris_colour(scan: Mesh, eyes) -> np.ndarray | None:
@@ -155,7 +187,7 @@ def colour_image(skin: Mesh, source: ScanColour, unseen: np.ndarray, name: str, 
     if found is None or skin.uv is None:
         return None
     colour, gain = found
-    size = size or SIZE
+    size = size or source.size
     yield Progress(0.2, "Painting the skin")
     index, corners, weights = texels(skin, size)
     normals = vertex_normals(skin.vertices, skin.triangles)

@@ -7,6 +7,7 @@ scene of their own: the current scene, its selection and all datablocks are left
 
 import struct
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import bpy
@@ -18,8 +19,10 @@ from ..sim.cylindrical.map_files import is_range_map, read_range_map
 from ..sim.errors import InputError
 from ..sim.mesh import Mesh
 from ..sim.scan.ply import read_ply
+from ..sim.scan.texture import has_pictures, vertex_colours
 from . import bridge
 from .quiet import quiet
+from .scan_texture import with_pictures
 
 # Landmarks are given in the file's own axes, so OBJ and STL come in unturned, and glTF is turned back (`_FILE_AXES`).
 _RAW_AXES = {"forward_axis": "Y", "up_axis": "Z"}
@@ -166,7 +169,7 @@ def _meshes_of(scene) -> list[Mesh]:
     meshes = []
     for obj in scene.objects:
         if obj.type == "MESH" and len(obj.data.polygons):
-            mesh = bridge.object_to_mesh(obj)
+            mesh = with_pictures(bridge.object_to_mesh(obj), obj)
             matrix = np.array(obj.evaluated_get(graph).matrix_world)
             points = mesh.vertices * bridge.METRES
             meshes.append(mesh.moved(points @ matrix[:3, :3].T + matrix[:3, 3]))
@@ -174,13 +177,29 @@ def _meshes_of(scene) -> list[Mesh]:
 
 
 def joined(meshes: list[Mesh]) -> Mesh:
-    """Several meshes as one; colours are kept if any has them (white elsewhere), UVs and materials are not."""
+    """Several meshes as one; colours are kept if any has them (white elsewhere), UVs where they lead to pictures."""
     offsets = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
     faces = [np.where(m.faces >= 0, m.faces + offset, -1) for m, offset in zip(meshes, offsets, strict=False)]
     colour = None
     if any(mesh.colour is not None for mesh in meshes):
         white = [np.ones((len(m.vertices), 3), np.float32) if m.colour is None else m.colour for m in meshes]
         colour = np.concatenate(white)
-    return Mesh(
+    scan = Mesh(
         np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(faces).astype(np.int32), colour=colour
     )
+    return _with_all_pictures(scan, meshes)
+
+
+def _with_all_pictures(scan: Mesh, meshes: list[Mesh]) -> Mesh:
+    """``scan``, which is ``meshes`` as one, with their pictures, and the colours that those give its vertices."""
+    if not any(has_pictures(mesh) for mesh in meshes):
+        return scan
+    uv, material, pictures = [], [], []
+    for mesh in meshes:
+        shown = has_pictures(mesh)
+        uv.append(mesh.uv if shown else np.zeros((len(mesh.faces), 4, 2), np.float32))
+        material.append((mesh.material if shown else np.zeros(len(mesh.faces), np.int16)) + len(pictures))
+        pictures += mesh.pictures if shown else (None,)
+    uv, material = np.concatenate(uv), np.concatenate(material).astype(np.int16)
+    scan = replace(scan, uv=uv, material=material, pictures=tuple(pictures))
+    return replace(scan, colour=vertex_colours(scan))

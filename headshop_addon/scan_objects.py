@@ -19,6 +19,8 @@ from ..sim.progress import Work, finish
 from ..sim.scan.orientation import Orientation
 from ..sim.scan.units import BY_FACE, unit_words
 from . import active, bridge, heads, pipeline, scan_landmarks
+from .scan_import import joined
+from .scan_texture import with_pictures
 
 TURN = "headshop_turn"
 
@@ -52,7 +54,7 @@ def adopt(context, original: bpy.types.Object) -> Work:
     ------
     InputError : it is no head (`sim.scan.clean`, `sim.scan.orientation`).
     """
-    scan = yield from pipeline.prepare_scan(bridge.object_to_mesh(original))
+    scan = yield from pipeline.prepare_scan(joined([with_pictures(bridge.object_to_mesh(original), original)]))
     obj = _add(context, scan, f"{original.name} Scan")
     turn = scan.orientation.matrix  # mm to mm here: the translation is zero, so it serves for metres too
     obj.matrix_world = original.matrix_world @ Matrix(np.linalg.inv(turn).tolist())

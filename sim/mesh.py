@@ -15,8 +15,10 @@ class Mesh:
     vertices : (n, 3) float64, mm
     faces : (m, 4) int32, corners counter-clockwise seen from outside; a triangle has -1 in the last column
     uv : (m, 4, 2) float32 or None, texture coordinates per face corner
-    material : (m,) int16 or None, index into the part's material names (`headshop.sim.anatomy.head.MATERIALS`)
+    material : (m,) int16 or None, index into the part's material names (`headshop.sim.anatomy.head.MATERIALS`), or into
+        the ``pictures`` of a scan
     colour : (n, 3) float32 or None, sRGB colour per vertex, 0..1 (scans)
+    pictures : (h, w, 3) uint8 each, sRGB, first row at the bottom: what faces of that material show; None: nothing (scans)
     """
 
     vertices: np.ndarray
@@ -24,6 +26,7 @@ class Mesh:
     uv: np.ndarray | None = None
     material: np.ndarray | None = None
     colour: np.ndarray | None = None
+    pictures: tuple[np.ndarray | None, ...] = ()
 
     @classmethod
     def from_triangles(cls, vertices, triangles, **more) -> "Mesh":

@@ -10,6 +10,7 @@ from scipy.sparse.csgraph import connected_components
 from ..errors import InputError
 from ..mesh import Mesh, cross_sides
 from ..progress import Progress, Work, finish
+from .texture import has_pictures, triangle_corners
 from .winding import wound_alike
 
 #: Fewer triangles than this are no head.
@@ -29,8 +30,8 @@ def cleaning(mesh: Mesh) -> Work:
     """Work returning a triangle mesh without NaN vertices, zero-area, duplicate faces and unused vertices; equal ones welded,
     neighbours wound the same way round.
 
-    It returns the mesh (colours kept: the mean of those welded) and counts: ``vertices``, ``triangles``, ``components`` of
-    the result, what was removed: ``nonfinite_vertices``, ``nonfinite_faces``, ``welded_vertices``,
+    It returns the mesh (colours kept: the mean of those welded; pictures too) and counts: ``vertices``, ``triangles`` and
+    ``components`` of the result, what was removed: ``nonfinite_vertices``, ``nonfinite_faces``, ``welded_vertices``,
     ``zero_area_faces``, ``duplicate_faces``, ``unused_vertices``, and the ``turned_faces``.
 
     Raises
@@ -39,6 +40,7 @@ def cleaning(mesh: Mesh) -> Work:
     """
     yield Progress(0.0, "Cleaning the scan")
     points, triangles = mesh.vertices, mesh.triangles
+    rows = np.arange(len(triangles))
     _refuse_hopeless(points, triangles)
     counts = {}
     finite = np.isfinite(points).all(axis=1)
@@ -47,7 +49,7 @@ def cleaning(mesh: Mesh) -> Work:
         raise InputError("No vertex of the scan has a position (all are NaN): export the scan again.")
     usable = finite[triangles].all(axis=1)
     counts["nonfinite_faces"] = int((~usable).sum())
-    triangles = triangles[usable]
+    triangles, rows = triangles[usable], rows[usable]
     extent = np.ptp(points[finite], axis=0).max()
     if not 0 < extent < 1e12:
         raise InputError(f"The scan measures {extent:g} units across, which is no head in any unit: check the export.")
@@ -69,12 +71,12 @@ def cleaning(mesh: Mesh) -> Work:
     yield Progress(0.5, "Cleaning the scan")
     flat = _flat(points, triangles)
     counts["zero_area_faces"] = int(flat.sum())
-    triangles = triangles[~flat]
+    triangles, rows = triangles[~flat], rows[~flat]
     yield Progress(0.6, "Cleaning the scan")
     again = _repeated(triangles)
     yield Progress(0.85, "Cleaning the scan")
     counts["duplicate_faces"] = int(again.sum())
-    triangles = triangles[~again]
+    triangles, rows = triangles[~again], rows[~again]
 
     kept = np.zeros(len(points), dtype=bool)
     kept[triangles.ravel()] = True
@@ -95,7 +97,20 @@ def cleaning(mesh: Mesh) -> Work:
         "triangles": len(triangles),
         "components": components(triangles, len(points))[0],
     }
-    return replace(Mesh.from_triangles(points, triangles), colour=colour), counts
+    clean = replace(Mesh.from_triangles(points, triangles), colour=colour)
+    return _with_pictures(clean, mesh, rows, turned), counts
+
+
+def _with_pictures(clean: Mesh, mesh: Mesh, rows, turned) -> Mesh:
+    """``clean`` with the pictures of ``mesh``, of whose triangles ``rows`` (t,) were kept and ``turned`` (t,) bool turned."""
+    if not has_pictures(mesh):
+        return clean
+    corners, material = triangle_corners(mesh)
+    corners = corners[rows]
+    corners[turned] = corners[turned, ::-1]
+    uv = np.zeros((len(rows), 4, 2), np.float32)
+    uv[:, :3] = corners
+    return replace(clean, uv=uv, material=material[rows], pictures=mesh.pictures)
 
 
 def components(triangles: np.ndarray, vertex_count: int) -> tuple[int, np.ndarray]:
