@@ -128,6 +128,15 @@ def test_what_cannot_be_a_head_is_refused(change, says):
     assert str(caught.value).endswith(".") and str(caught.value).count(". ") == 0
 
 
+def test_a_scan_far_from_the_origin_is_refused_and_one_beside_it_is_not():
+    """As georeferenced ones lie, whose heads would be stairs in Blender's numbers."""
+    points, triangles = _dome()
+    with pytest.raises(InputError, match="25,000 times its own size from the origin"):
+        clean_scan(Mesh.from_triangles(points + [3e6, 4e6, 0], triangles))
+    mesh, _ = clean_scan(Mesh.from_triangles(points + [1e5, 1e5, 0], triangles))
+    np.testing.assert_allclose(mesh.vertices, points + [1e5, 1e5, 0])
+
+
 @pytest.mark.parametrize(("kind", "says"), [("one_triangle", "1 triangle"), ("nan", "all are NaN")])
 def test_bad_files_that_can_be_read(bad_scan, kind, says):
     with pytest.raises(InputError, match=says):

@@ -17,6 +17,8 @@ from .winding import wound_alike
 FEWEST_TRIANGLES = 100
 #: More than this would not fit the memory of an ordinary machine.
 MOST_TRIANGLES = 40_000_000
+#: Times its own size that a scan may lie from the origin, as georeferenced ones do.
+FARTHEST = 1000
 #: A triangle is a line when its height is below this part of its longest edge.
 FLAT = 1e-7
 
@@ -36,7 +38,8 @@ def cleaning(mesh: Mesh) -> Work:
 
     Raises
     ------
-    InputError : nothing usable is there: no faces, too few, too many, all NaN, all in one point or plane.
+    InputError : nothing usable is there: no faces, too few, too many, all NaN, all in one point or plane,
+    too far from the origin.
     """
     yield Progress(0.0, "Cleaning the scan")
     points, triangles = mesh.vertices, mesh.triangles
@@ -53,6 +56,7 @@ def cleaning(mesh: Mesh) -> Work:
     extent = np.ptp(points[finite], axis=0).max()
     if not 0 < extent < 1e12:
         raise InputError(f"The scan measures {extent:g} units across, which is no head in any unit: check the export.")
+    _refuse_far(points[finite], extent)
 
     kept = np.zeros(len(points), dtype=bool)
     kept[triangles.ravel()] = True
@@ -140,6 +144,16 @@ def _refuse_hopeless(points, triangles):
         )
     if triangles.min() < 0 or triangles.max() >= len(points):
         raise InputError("The scan is damaged, a face names a vertex that does not exist: export it again.")
+
+
+def _refuse_far(points, extent):
+    """Blender's numbers, which have 24 bits, are .02 mm apart where a head is `FARTHEST` times its size from the origin."""
+    away = np.linalg.norm((points.min(axis=0) + points.max(axis=0)) / 2)
+    if away > FARTHEST * extent:
+        raise InputError(
+            f"The scan lies {away / extent:,.0f} times its own size from the origin of its coordinates, too far to be exact: "
+            "move it there, and its landmarks with it, and export it again."
+        )
 
 
 def _refuse_flat(points):
