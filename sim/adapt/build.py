@@ -96,7 +96,7 @@ def build_head(
     check_arrangement(reference.landmark_positions(), given, found)
     yield Progress(0.08, "Judging the landmarks")
     check_on_surface(given, target)
-    look = yield from portion(first_look(reference, target, given, out, found), 0.1, 0.3)
+    look = yield from portion(first_look(reference, target, given, out, found, scan), 0.1, 0.3)
     fit = yield from portion(fit_skin(reference, look.filled, look.landmarks, look.lips, found, look.guessed), 0.3, 0.6)
     fit = look.seen_only(fit)
     yield Progress(0.6, "Judging the fit")

@@ -26,7 +26,7 @@ BOW = 4 * ALONG * (1 - ALONG)
 INSIDE, BETWEEN = slice(4, -4), np.linspace(0.25, 0.75, 5)
 #: mm that an outline may differ from where an eye is looked for: both corners along the eye, their height, half the difference
 #: of their heights, the lower margin in the middle, and from there to the upper one.
-BOUNDS = ((-5, 5), (-5, 5), (-6, 7), (-3, 3), (-6, 3), (5, 14))
+BOUNDS = ((-5, 5), (-5, 5), (-6, 7), (-3, 3), (-6, 0), (5, 14))
 #: How plain both margins of a blank eye are, 0..1, and how steep against what lies between them. On 21 scans of blank eyes .75
 #: and more, 1.7 and more; of 18 others, most of them shut, those as steep are at most .65 plain, those as plain 1.2 steep.
 PLAIN, SMOOTHER = 0.7, 1.5

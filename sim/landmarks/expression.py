@@ -2,13 +2,14 @@
 """Whether the scan's lips are parted and its eyes shut."""
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from ..adapt.closest import Surface
 from ..adapt.lid_line import PLAIN, LidLine
+from ..mesh import Mesh
 from ..relax.mouth_gap import lip_edges
 from ..relax.upper_teeth import incisal_edge
 from .blank_eyes import blank_eyes
+from .eye_colours import open_by_colours
 from .eye_gaps import EyeGaps, eyes_shown, gaps_in_eyes
 from .eye_sockets import socket_corners
 from .eyeballs_seen import eyeballs_seen
@@ -20,11 +21,8 @@ from .picked import moved
 from .shape_fit import CHANGE, REST, Expression, ShapeFit, Told, fit_shape, part_of
 from .shape_space import ShapeSpace
 
-AROUND_EYE = 22.0  # mm
 FAR = 3.0  # mm that a point of the skin without data counts as
 AROUND_MOUTH = 35.0  # mm
-SHUT = 0.6  # eyes shut this far though they were taken for open are shut: a broad smile shuts them by 0.4
-REASON = 0.95  # shut eyes must fit that much better
 LOOKED = np.linspace(-0.28, 0.28, 9)  # shares of the way from the middle of the mouth to its corners
 #: Eyes that are open, as their gaps tell, and shut farther than this were misread: the gaps take the lids' edges with them,
 #: and nothing else holds the lids up.
@@ -44,10 +42,13 @@ NO_WORSE, BETTER = 1.05, 0.75
 FEW = 25  # percent of them at which lips that are parted may seem closed: noise looks like edges in places only
 
 
-def fit_expression(space: ShapeSpace, target: Surface, fit: ShapeFit):
-    """A generator: yields the fraction done, returns the `ShapeFit` and the `Expression` that the scan shows."""
+def fit_expression(space: ShapeSpace, target: Surface, fit: ShapeFit, scan: Mesh | None = None):
+    """A generator: yields the fraction done, returns the `ShapeFit` and the `Expression` that the scan shows.
+
+    scan : its vertices, mm, and their colours, if it has any
+    """
     fit, parted, told = yield from _fit_lips(space, target, fit)
-    return (yield from _fit_lids(space, target, fit, parted, told))
+    return (yield from _fit_lids(space, target, fit, parted, told, scan))
 
 
 def _fit_lips(space, target, fit):
@@ -73,7 +74,7 @@ def _fit_lips(space, target, fit):
     return fit, False, told
 
 
-def _fit_lids(space, target, fit, parted, told):
+def _fit_lids(space, target, fit, parted, told, scan):
     """As `fit_expression`, of a ``fit`` whose lips are ``parted`` and of which that is ``told`` already."""
 
     def changed(expression, start, more=None):
@@ -93,19 +94,17 @@ def _fit_lids(space, target, fit, parted, told):
         return (yield from changed(Expression(parted), fit.coefficients, lids)), Expression(parted, lids=seen)
     lines, share = lid_lines(space, fit, target, sides), shut_share(space, fit)
     seen_share = {side: share[side] for side in sides}
-    shut = False if known_open else shut_by_sight(gaps, lines, seen_share)
-    if shut is False:
-        if max(seen_share.values()) <= DROOPED:
+    by_colours = None if known_open else open_by_colours(scan, *laid[:2], sides)
+    shut = shut_by_sight(gaps, lines, seen_share) if by_colours is None else not by_colours
+    if known_open or not shut:
+        seen_open = known_open or shut is False
+        if seen_open and max(seen_share.values()) <= DROOPED:
             return fit, Expression(parted)
         wide = Expression(parted, wide=True)
         return (yield from changed(wide, fit.coefficients)), wide
     both = Expression(parted, ("l", "r"))
     shutting = fit.coefficients + sum((1 - share[side]) * space.shut[side] for side in both.shut)
-    if shut:
-        return (yield from changed(both, shutting, told_of_lids(space, fit, lines))), both
-    rival, about = (yield from changed(both, shutting)), eyes(space)
-    better = min(seen_share.values()) > SHUT or cost(space, rival, about) < REASON * cost(space, fit, about)
-    return (rival, both) if better else (fit, Expression(parted))
+    return (yield from changed(both, shutting, told_of_lids(space, fit, lines))), both
 
 
 def shut_by_sight(gaps: EyeGaps, lines: dict[str, LidLine], share: dict[str, float]) -> bool | None:
@@ -178,13 +177,6 @@ def meeting_lids(space: ShapeSpace, fit: ShapeFit, target: Surface, shut) -> dic
         place = found.points[0] if found.found[0] else middle
         out |= {f"ps_{side}": place, f"pi_{side}": place}
     return out
-
-
-def eyes(space: ShapeSpace) -> np.ndarray:
-    """(n,) bool, the skin around the eyes."""
-    marks = space.landmarks(space.points)
-    middles = [(marks[f"en_{side}"] + marks[f"ex_{side}"]) / 2 for side in "lr"]
-    return cKDTree(middles).query(space.points)[0] < AROUND_EYE
 
 
 def about_mouth(space: ShapeSpace) -> np.ndarray:

@@ -84,6 +84,7 @@ def _finding(mesh: Mesh, reference: Head | None, unit_scales, any_size: bool) ->
     yield Progress(0.0, LOOKING)
     reference = reference or reference_head()
     space = shape_space(reference)
+    scan = mesh
     jumps = depth_jumps(mesh.vertices, mesh.triangles)
     mesh = Mesh.from_triangles(mesh.vertices, mesh.triangles[~jumps]) if jumps.any() else mesh
     yield Progress(0.05, LOOKING)
@@ -92,12 +93,13 @@ def _finding(mesh: Mesh, reference: Head | None, unit_scales, any_size: bool) ->
     fit = yield from portion(with_likelier_ears(space, target, fit), 0.75, 0.79)
     fit, telling = yield from run(fit_without_glasses(space, target, fit), 0.79, 0.8, "Looking for glasses")
     target = target.without(glasses_seen(space, telling, target))
+    scan = scan.moved(scan.vertices * scale)
     whole = space
     fit, space = yield from run(with_unseen_jaw(space, target, fit), 0.8, 0.81, "Looking for the mouth")
     if space.of_infants:
         fit = yield from run(with_mouth_in_place(space, target, fit), 0.81, 0.82, "Looking for the mouth")
     misfit = misfit_of(space, fit)
-    fit, shown = yield from run(fit_expression(space, target, fit), 0.82, 0.88, "Looking at lips and lids")
+    fit, shown = yield from run(fit_expression(space, target, fit, scan), 0.82, 0.88, "Looking at lips and lids")
     hair = yield from run(fit_under_hair(space, target, fit, shown), 0.88, 0.9, "Looking for hair")
     fit = hair.fit
     positions = picked(space, fit, target)

@@ -15,6 +15,7 @@ from ..adapt.scan_surface import NO_SKIN
 from ..adapt.skin_fit import SkinFit
 from ..adapt.thin_plate_spline import similarity
 from ..anatomy.head import Head
+from ..mesh import Mesh
 from ..progress import Work
 from ..relax.mouth_gap import MARKS
 from .confidence import in_mid_air
@@ -70,11 +71,13 @@ def first_look(
     given: dict[str, np.ndarray],
     leave_out: Collection[str] = NO_SKIN,
     found: Collection[str] = (),
+    scan: Mesh | None = None,
 ) -> Work:
     """Work returning the `FirstLook` at the scan ``target`` with the landmarks ``given`` (name -> (3,) mm).
 
     leave_out : of `NO_SKIN`; what the lips hold, glasses, or hair, is taken for skin where it is not among them
     found : names of those given that nobody picked: in mid-air they are guesses, and of an infant they tell nothing
+    scan : its vertices, mm, and their colours, which tell whether eyes are open
     """
     rest = reference.landmark_positions()
     names = [name for name in given if name in rest]
@@ -104,7 +107,7 @@ def first_look(
             fit, space = yield from run(with_unseen_jaw(space, coarse, fit), 0.55, 0.58, LOOKING)
         if space.of_infants:
             fit = yield from run(with_mouth_in_place(space, coarse, fit), 0.58, 0.6, LOOKING)
-        fit, shown = yield from run(fit_expression(space, coarse, fit), 0.6, 0.9, LOOKING)
+        fit, shown = yield from run(fit_expression(space, coarse, fit, scan), 0.6, 0.9, LOOKING)
         skull = [n for n in names if n.partition("_")[0] in SKULL and n not in found]
         off = in_mid_air(target, np.reshape([given[n] for n in skull], (-1, 3)))
         known = {n: given[n] for n in np.array(skull)[off]}
