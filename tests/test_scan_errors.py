@@ -8,6 +8,7 @@ from headshop.sim.errors import InputError
 from headshop.sim.mesh import Mesh
 from headshop.sim.scan.clean import clean_scan
 from headshop.sim.scan.ply import read_ply
+from headshop.sim.scan.whole_files import require_whole
 
 
 def _dome(n=20):
@@ -141,3 +142,37 @@ def test_real_scans_pass(shared, name):
     assert counts["triangles"] == len(raw.triangles) - counts["zero_area_faces"] - counts["duplicate_faces"]
     if name == "lps_infinite":
         assert counts["welded_vertices"] > 0 and counts["components"] == 1
+
+
+_SOLID = b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\n"
+_BINARY = b"solid, but not a text\0".ljust(80) + (2).to_bytes(4, "little") + bytes(100)
+_OBJ = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nf 1//1 2//1 \\\n 3//1 # 9\nf -3 -2 -1\n"
+
+
+@pytest.mark.parametrize(
+    ("name", "data", "says"),
+    [
+        ("a.stl", _SOLID + b"endsolid a\n", None),
+        ("a.stl", _SOLID + b"END SOLID a with a long name\n\n" + _SOLID + b"endsolid", None),
+        ("a.stl", _BINARY, None),
+        ("a.stl", _SOLID, "cut off: it does not end with endsolid"),
+        ("a.stl", _SOLID + b"endsolid a\n" + _SOLID[:60], "cut off: it does not end with endsolid"),
+        ("a.stl", _BINARY[:-1], "cut off: it has 183 bytes of 184"),
+        ("a.stl", b"v 1 2 3\n" * 99, "not an STL file"),
+        ("a.stl", b"letter", "not an STL file"),
+        ("a.obj", _OBJ, None),
+        ("a.obj", _OBJ + b"f 1 2 4\n", "a face names a vertex"),
+        ("a.obj", _OBJ + b"f 1 2 0\n", "a face names a vertex"),
+        ("a.obj", _OBJ + b"f 1/9 2/9 -4/9\n", "a face names a vertex"),
+        ("a.glb", b"glTF\2\0\0\0\x40\0\0\0", "cut off: it has 12 bytes of 64"),
+        ("a.glb", b"glTF\2\0\0\0\x0c\0\0\0", None),
+    ],
+)
+def test_files_that_are_not_whole_are_refused(tmp_path, name, data, says):
+    path = tmp_path / name
+    path.write_bytes(data)
+    if says is None:
+        require_whole(path)
+        return
+    with pytest.raises(InputError, match=says):
+        require_whole(path)
