@@ -111,7 +111,7 @@ def test_of_landmarks_that_nobody_picked_none_is_to_be_placed_again(reference):
 def test_wrong_units_are_named(people, reference, factor, unit):
     surface, marks = people["lps_infinite"]
     said = _refusal(check_against_scan, {n: p / factor for n, p in marks.items()}, surface)
-    assert f"landmarks were in {unit}" in said and f"{factor:g}" in said
+    assert f"landmarks were in {unit}" in said and f"{factor:g}" in said and "--units" in said
     small = Surface(surface.vertices / factor, surface.triangles)
     said = _refusal(check_against_scan, marks, small)
     assert f"scan were in {unit}" in said

@@ -52,7 +52,8 @@ def check_against_scan(landmarks: dict[str, np.ndarray], scan: Mesh | Surface) -
         if away < AWAY:
             raise InputError(
                 f"The landmarks span {size:.3g} mm and the scan {scan_size:.0f} mm, as if the landmarks were in "
-                f"{unit}: multiply them by {factor:g}."
+                f"{unit}, or the scan's unit {factor:g} times as long as it is: multiply the landmarks by {factor:g}, or "
+                "correct the unit (--units)."
             )
     if size > 3 * scan_size:
         away, factor, unit = min((f * np.median(surface.closest(points / f).distance), f, unit) for f, unit in units)
