@@ -68,6 +68,7 @@ def test_each_fault_is_removed_and_counted():
         "nonfinite_vertices": 2,
         "nonfinite_faces": 1,
         "welded_vertices": 1,
+        "stray_vertices": 0,
         "zero_area_faces": 2,
         "duplicate_faces": 2,
         "turned_faces": 0,
@@ -80,6 +81,33 @@ def test_each_fault_is_removed_and_counted():
     seam = np.flatnonzero((mesh.vertices == points[7]).all(axis=1))
     np.testing.assert_allclose(mesh.colour[seam], [[0.625] * 3])
     assert np.delete(mesh.colour, seam, axis=0).max() == 0.5
+
+
+@pytest.mark.parametrize("away", [1_000.0, 1e6, 1e30])
+@pytest.mark.parametrize("soup", [False, True])
+def test_stray_vertices_are_dropped_with_their_faces(away, soup):
+    points, triangles = _dome()
+    whole, _ = clean_scan(Mesh.from_triangles(points, triangles))
+    gone = np.isin(triangles, [150, 205]).any(axis=1)
+    points[[150, 205]] += [[0, 0, away], [-away, 0, 9]]
+    scan = Mesh.from_triangles(points, triangles)
+    if soup:
+        scan = Mesh.from_triangles(points[triangles].reshape(-1, 3), np.arange(3 * len(triangles)))
+    mesh, counts = clean_scan(scan)
+    assert (counts["stray_vertices"], counts["unused_vertices"], counts["vertices"]) == (2, 0, 398)
+    assert counts["triangles"] == (~gone).sum() and np.isin(mesh.vertices, whole.vertices).all()
+
+
+def test_a_wall_far_behind_is_no_stray():
+    """Decimated to two triangles, with jumps drawn from the rim of the head to its corners."""
+    points, triangles = _dome()
+    wall = np.array([[-2000, -2000, -3000], [2000, -2000, -3000], [2000, 2000, -3000], [-2000, 2000, -3000.0]])
+    rims = [np.arange(20) * 20, 380 + np.arange(20), np.arange(400)[::-20], np.arange(20)[::-1]]
+    jumps = [[a, b, 400 + k] for k, rim in enumerate(rims) for a, b in zip(rim, rim[1:], strict=False)]
+    corners = [[rim[-1], 400 + k, 400 + (k + 1) % 4] for k, rim in enumerate(rims)]
+    faces = np.concatenate([triangles, jumps, corners])
+    _, counts = clean_scan(Mesh.from_triangles(np.concatenate([points, wall]), faces))
+    assert counts["stray_vertices"] == 0 and counts["triangles"] == len(faces)
 
 
 def test_triangles_wound_the_other_way_than_their_neighbours_are_turned():

@@ -10,6 +10,7 @@ from scipy.sparse.csgraph import connected_components
 from ..errors import InputError
 from ..mesh import Mesh, cross_sides
 from ..progress import Progress, Work, finish
+from .strays import stray_vertices
 from .winding import wound_alike
 
 #: Fewer triangles than this are no head.
@@ -30,8 +31,8 @@ def cleaning(mesh: Mesh) -> Work:
     neighbours wound the same way round.
 
     It returns the mesh (colours kept: the mean of those welded) and counts: ``vertices``, ``triangles``, ``components`` of
-    the result, what was removed: ``nonfinite_vertices``, ``nonfinite_faces``, ``welded_vertices``,
-    ``zero_area_faces``, ``duplicate_faces``, ``unused_vertices``, and the ``turned_faces``.
+    the result, what was removed: ``nonfinite_vertices``, ``nonfinite_faces``, ``welded_vertices``, ``stray_vertices``
+    with the faces at them, ``zero_area_faces``, ``duplicate_faces``, ``unused_vertices``, and the ``turned_faces``.
 
     Raises
     ------
@@ -48,10 +49,6 @@ def cleaning(mesh: Mesh) -> Work:
     usable = finite[triangles].all(axis=1)
     counts["nonfinite_faces"] = int((~usable).sum())
     triangles = triangles[usable]
-    extent = np.ptp(points[finite], axis=0).max()
-    if not 0 < extent < 1e12:
-        raise InputError(f"The scan measures {extent:g} units across, which is no head in any unit: check the export.")
-
     kept = np.zeros(len(points), dtype=bool)
     kept[triangles.ravel()] = True
     counts["unused_vertices"] = int((finite & ~kept).sum())
@@ -65,6 +62,10 @@ def cleaning(mesh: Mesh) -> Work:
     counts["welded_vertices"] = len(points) - count
     points, colour = _merged(points, colour, same, count)
     triangles = same[triangles]
+    stray = stray_vertices(points, triangles)
+    counts["stray_vertices"] = int(stray.sum())
+    triangles = triangles[~stray[triangles].any(axis=1)]
+    _refuse_extent(points[~stray])
 
     yield Progress(0.5, "Cleaning the scan")
     flat = _flat(points, triangles)
@@ -78,7 +79,7 @@ def cleaning(mesh: Mesh) -> Work:
 
     kept = np.zeros(len(points), dtype=bool)
     kept[triangles.ravel()] = True
-    counts["unused_vertices"] += int((~kept).sum())
+    counts["unused_vertices"] += int((~kept & ~stray).sum())
     triangles = (np.cumsum(kept) - 1)[triangles]
     points, colour = points[kept], None if colour is None else colour[kept]
     if len(triangles) < FEWEST_TRIANGLES:
@@ -125,6 +126,12 @@ def _refuse_hopeless(points, triangles):
         )
     if triangles.min() < 0 or triangles.max() >= len(points):
         raise InputError("The scan is damaged, a face names a vertex that does not exist: export it again.")
+
+
+def _refuse_extent(points):
+    extent = np.ptp(points, axis=0).max() if len(points) else 1.0
+    if not 0 < extent < 1e12:
+        raise InputError(f"The scan measures {extent:g} units across, which is no head in any unit: check the export.")
 
 
 def _refuse_flat(points):
