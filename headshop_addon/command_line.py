@@ -19,7 +19,7 @@ from .quiet import patient
 
 INTERRUPTED = 130
 RELAX = ("auto", "always", "never")
-SETS = ("muscles", "facs", "arkit", "expressions", "rig")
+SETS = ("muscles", "arkit", "expressions", "rig")
 
 
 class _Parser(argparse.ArgumentParser):
@@ -42,7 +42,7 @@ def parser() -> argparse.ArgumentParser:
     common.add_argument("--debug", action="store_true", help="on errors, show where in the program they happened")
     common.add_argument("--quiet", action="store_true", help="no progress bar and no summary")
     plain = argparse.ArgumentParser(add_help=False)
-    plain.add_argument("--export", metavar="DIR", help="also write plain files (PLY, JSON, NPZ; mm) into DIR")
+    plain.add_argument("--export", metavar="DIR", help="also write plain files (PLY, JSON, NPZ, PNG; mm) into DIR")
     chosen = argparse.ArgumentParser(add_help=False)
     chosen.add_argument("head", metavar="HEAD.blend", help="a file that headshop build or the add-on made")
     chosen.add_argument("--head", dest="name", metavar="NAME", help="which head, if the file holds several")

@@ -93,10 +93,6 @@ def bake(options) -> None:
         raise InputError(
             "There is nothing to bake: give --set muscles, --set expressions, --set arkit, --set rig or --performance FILE."
         )
-    if options.poses == "facs":
-        raise InputError(
-            f"The set {options.poses} is not in this version: bake --set muscles, expressions, arkit or rig."
-        )
     if options.dynamic and options.performance is None:
         raise InputError("Only a performance moves in time: give --performance FILE, or leave out --dynamic.")
     output = options.output or options.head

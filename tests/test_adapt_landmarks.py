@@ -2,6 +2,7 @@
 """Landmark files and the gate: what is legal is read, each fault gets its own sentence."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -153,3 +154,9 @@ def test_arrangements_that_are_no_face():
     ):
         with pytest.raises(InputError, match=word):
             check_arrangement(reference, changed)
+
+
+def test_every_landmark_is_documented():
+    text = (Path(__file__).resolve().parents[1] / "docs" / "landmarks.md").read_text()
+    bases = {name.removesuffix("_l").removesuffix("_r") for name in SKIN}
+    assert [name for name in bases if f"| `{name}` |" not in text] == []

@@ -73,6 +73,7 @@ def build(scan, landmarks, tmp_path):
         (["build"], "SCAN"),
         (["build", "x.ply"], "--output"),
         (["bake", "x.blend", "--set", "all"], "all"),
+        (["bake", "x.blend", "--set", "facs"], "invalid choice: 'facs'"),
         (["build", "x.ply", "-o", "x.blend", "--units", "miles"], "miles"),
         (["build", "x.ply", "-o", "x.blend", "--up", "w"], "choose from"),
         (["sample", "-o", "x", "--seed", "-1"], "whole number from 0"),
@@ -167,13 +168,6 @@ def test_an_output_that_cannot_be_written(capfd, tmp_path, scan, landmarks, outp
     assert output.split("/")[-1].split(".")[0] in fails(
         capfd, tmp_path, "build", scan, "--landmarks", given, "-o", tmp_path / output
     )
-
-
-@pytest.mark.parametrize("name", ["facs"])
-def test_sets_to_come(capfd, tmp_path, name):
-    head = tmp_path / "head.blend"
-    head.write_bytes(b"anything")
-    assert f"set {name} is not in this version" in fails(capfd, tmp_path, "bake", head, "--set", name)
 
 
 def test_a_blend_that_is_none(bpy, capfd, tmp_path):
