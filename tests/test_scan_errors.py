@@ -6,6 +6,7 @@ import pytest
 
 from headshop.sim.errors import InputError
 from headshop.sim.mesh import Mesh
+from headshop.sim.scan import whole_files
 from headshop.sim.scan.clean import clean_scan
 from headshop.sim.scan.ply import read_ply
 from headshop.sim.scan.whole_files import require_whole
@@ -196,7 +197,9 @@ _OBJ = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nf 1//1 2//1 \\\n 3//1 # 9\nf -3 -2
         ("a.glb", b"glTF\2\0\0\0\x0c\0\0\0", None),
     ],
 )
-def test_files_that_are_not_whole_are_refused(tmp_path, name, data, says):
+@pytest.mark.parametrize("block", [1, 1 << 24])
+def test_files_that_are_not_whole_are_refused(tmp_path, monkeypatch, name, data, says, block):
+    monkeypatch.setattr(whole_files, "_BLOCK", block)
     path = tmp_path / name
     path.write_bytes(data)
     if says is None:

@@ -11,6 +11,7 @@ from ..errors import InputError
 from .clean import MOST_TRIANGLES
 
 _TAIL = 4096  # bytes at the end of a text in which its last words stand
+_BLOCK = 1 << 24  # bytes of a text that are looked at together
 
 
 def require_whole(path) -> None:
@@ -58,15 +59,30 @@ def _check_glb(path, size):
 
 def _check_obj(path, size):
     """Corners are counted from 1, or from the last vertex, -1, backward."""
-    data = path.read_bytes().replace(b"\\\n", b" ").replace(b"\\\r\n", b" ")
-    count = len(re.findall(rb"^\s*v\s", data, re.MULTILINE))
-    corners = b" ".join(re.findall(rb"^\s*f\s([^\r\n#]*)", data, re.MULTILINE))
-    try:
-        corners = np.array(re.sub(rb"/\S*", b"", corners).split(), dtype=np.int64)
-    except (ValueError, OverflowError):
-        return  # what Blender makes of it decides
-    if len(corners) and ((corners == 0) | (corners > count) | (corners < -count)).any():
+    vertices, least, most, none = 0, 0, 0, False
+    with path.open("rb") as stream:
+        while block := stream.read(_BLOCK) + stream.readline():
+            while block.endswith((b"\\\n", b"\\\r\n")):  # the line goes on
+                block += stream.readline() or b"\n"
+            vertices += len(re.findall(rb"^[ \t]*v\s", block, re.MULTILINE))
+            corners = _corners(block)
+            if corners is None:
+                return  # what Blender makes of it decides
+            if len(corners):
+                least, most = min(least, corners.min()), max(most, corners.max())
+                none |= bool((corners == 0).any())
+    if none or most > vertices or least < -vertices:
         raise InputError(f"{path} is damaged, a face names a vertex that does not exist: export the scan again.")
+
+
+def _corners(block):
+    """The vertices (k,) that the faces in a part of an OBJ name; None if some are no numbers."""
+    block = block.replace(b"\\\r\n", b" ").replace(b"\\\n", b" ")
+    named = b" ".join(re.findall(rb"^[ \t]*f[ \t]([^\r\n#]*)", block, re.MULTILINE))
+    try:
+        return np.array(re.sub(rb"/\S*", b"", named).split(), dtype=np.int64)
+    except (ValueError, OverflowError):
+        return None
 
 
 def _cut_off(path, size, wanted) -> InputError:
