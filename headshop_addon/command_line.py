@@ -1,22 +1,25 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The program ``headshop``: what it understands and how it ends. What the commands do is in `commands`.
 
-Exit status: 0 done, 2 the input is at fault, 1 our own fault, 130 interrupted; with anything but 0, one sentence on
-stderr and no file left behind.
+Exit status: 0 done, 2 the input is at fault, 1 our own fault, 130 interrupted (as a process of its own it dies by the
+signal instead, lest a shell's loop goes on); with anything but 0, one sentence on stderr and no file left behind.
 """
 
 import argparse
+import atexit
 import os
+import shutil
 import signal
 import sys
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from pathlib import Path
 
-from ..sim.acting import models
 from ..sim.errors import InputError
+from .quiet import patient
 
 INTERRUPTED = 130
 RELAX = ("auto", "always", "never")
-SETS = ("muscles", "facs", "arkit", "expressions", "rig")
+SETS = ("muscles", "arkit", "expressions", "rig")
 
 
 class _Parser(argparse.ArgumentParser):
@@ -28,6 +31,9 @@ class _Parser(argparse.ArgumentParser):
 
 def parser() -> argparse.ArgumentParser:
     """The commands and options of DESIGN section 5."""
+    with patient():  # NumPy, struck while it is imported, says that it is broken
+        from ..sim.acting import models
+
     program = _Parser(
         prog="headshop", description="A raw scan of a head goes in, a head that acts comes out.", allow_abbrev=False
     )
@@ -36,7 +42,7 @@ def parser() -> argparse.ArgumentParser:
     common.add_argument("--debug", action="store_true", help="on errors, show where in the program they happened")
     common.add_argument("--quiet", action="store_true", help="no progress bar and no summary")
     plain = argparse.ArgumentParser(add_help=False)
-    plain.add_argument("--export", metavar="DIR", help="also write plain files (PLY, JSON, NPZ; mm) into DIR")
+    plain.add_argument("--export", metavar="DIR", help="also write plain files (PLY, JSON, NPZ, PNG; mm) into DIR")
     chosen = argparse.ArgumentParser(add_help=False)
     chosen.add_argument("head", metavar="HEAD.blend", help="a file that headshop build or the add-on made")
     chosen.add_argument("--head", dest="name", metavar="NAME", help="which head, if the file holds several")
@@ -45,7 +51,7 @@ def parser() -> argparse.ArgumentParser:
     about = "the scan's unit: mm, cm, m, in, or millimetres per unit as a number (default: detected)"
     reading.add_argument("--units", type=_unit, metavar="UNIT", help=about)
     up = "the scan's up axis: X, Y, Z or, written --up=-Z, one upside down (default: detected)"
-    reading.add_argument("--up", choices=("X", "Y", "Z", "-X", "-Y", "-Z"), metavar="AXIS", help=up)
+    reading.add_argument("--up", type=_axis, choices=("X", "Y", "Z", "-X", "-Y", "-Z"), metavar="AXIS", help=up)
 
     commands = program.add_subparsers(dest="command", metavar="COMMAND", parser_class=_Parser)
 
@@ -89,7 +95,7 @@ def parser() -> argparse.ArgumentParser:
     export.add_argument("-o", "--output", required=True, metavar="FILE.glb|fbx|usdc")
 
     sample = command("sample", "Write the embedded sample subject: scan, landmarks, truth.")
-    sample.add_argument("--seed", type=int, default=None, help="another individual")
+    sample.add_argument("--seed", type=_seed, default=None, help="another individual: a whole number from 0 up")
     sample.add_argument("-o", "--output", required=True, metavar="DIR")
     return program
 
@@ -105,8 +111,36 @@ def _unit(text: str) -> str:
     return text
 
 
+def _seed(text: str) -> int:
+    """What ``--seed`` may be."""
+    if not (text.isascii() and text.isdigit()):
+        raise argparse.ArgumentTypeError(f"{text!r} is no seed: give a whole number from 0 up")
+    return int(text)
+
+
+def _axis(text: str) -> str:
+    """``--up`` as its choices have it, however it is written: z, +Z."""
+    return text.strip().upper().removeprefix("+")
+
+
 def main(argv: list[str] | None = None) -> int:
-    """Run the program with ``argv`` (default: the process's arguments); returns the exit status."""
+    """Run the program with ``argv``; returns the exit status. Without ``argv`` the process is the program: its arguments
+    are taken, and it dies by the signal that interrupts it."""
+    struck: list[int] = []
+    if argv is None and os.name == "posix":
+        atexit.register(_die_by, struck)
+    try:
+        _print_anything()
+        status = _ending(argv, struck)
+        _finish_printing()
+        return status
+    except KeyboardInterrupt:
+        struck.append(signal.SIGINT)
+        return _say("Interrupted: nothing was written.", INTERRUPTED)
+
+
+def _ending(argv, struck: list[int]) -> int:
+    """The exit status of `main`; KeyboardInterrupt goes on, and the signal behind it is added to ``struck``."""
     program = parser()
     try:
         options = program.parse_args(argv)
@@ -121,41 +155,71 @@ def main(argv: list[str] | None = None) -> int:
         elif options.command is None:
             program.print_help()
         else:
-            with _terminable():
+            with _interruptible(struck):
                 getattr(commands, options.command)(options)
         return 0
-    except KeyboardInterrupt:
-        return _say("Interrupted: nothing was written.", INTERRUPTED)
     except InputError as error:
         return _say(_one_line(error), 2, debug)
-    except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # whoever read stdout has gone
-        return 1
+    except BrokenPipeError:  # whoever read stdout has gone; what was made is there
+        return 0
     except MemoryError:
         return _say("There is not enough memory for this.", 1, debug)
     except OSError as error:
         return _say(f"{error.filename or 'A file'}: {error.strerror or error}.", 1, debug)
     except Exception as error:  # a user gets a sentence, whatever happens
+        if struck:  # in a library that makes something else of it
+            raise KeyboardInterrupt from error
         what = f"{type(error).__name__}: {_one_line(error)}"
         return _say(f"Something went wrong that should not have ({what}): --debug shows where.", 1, debug)
 
 
 @contextmanager
-def _terminable():
-    """Being told to end (SIGTERM, as by ``timeout`` or a shutdown) cleans up as Ctrl-C does."""
+def _interruptible(struck: list[int]):
+    """Being told to end (SIGTERM, as by ``timeout`` or a shutdown) cleans up as Ctrl-C does; ``struck`` gets the signal."""
 
-    def interrupt(*_):
+    def interrupt(number, _):
+        struck.append(number)
         raise KeyboardInterrupt
 
+    before = {}
     try:
-        before = signal.signal(signal.SIGTERM, interrupt)
+        for number in (signal.SIGINT, signal.SIGTERM):
+            if number == signal.SIGTERM or callable(signal.getsignal(number)):  # Blender's own Ctrl-C is left alone
+                before[number] = signal.signal(number, interrupt)
     except ValueError:  # not the main thread: no signals arrive here
         yield
         return
     try:
         yield
     finally:
-        signal.signal(signal.SIGTERM, before if before is not None else signal.SIG_DFL)
+        for number, handler in before.items():
+            signal.signal(number, handler if handler is not None else signal.SIG_DFL)
+
+
+def _die_by(struck: list[int]) -> None:
+    """End this process by the first signal that struck it, if one did; Blender has no time then to remove its own folder."""
+    for number in struck:
+        blenders = Path(getattr(getattr(sys.modules.get("bpy"), "app", None), "tempdir", ""))
+        if blenders.name.startswith("blender_"):
+            shutil.rmtree(blenders, ignore_errors=True)
+        signal.signal(number, signal.SIG_DFL)
+        os.kill(os.getpid(), number)
+
+
+def _print_anything() -> None:
+    """What a terminal's encoding lacks, a name in another script for one, is printed escaped."""
+    for stream in (sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="backslashreplace")
+
+
+def _finish_printing() -> None:
+    """Empty the buffer of stdout, into nothing if whoever read it has gone."""
+    try:
+        if sys.stdout is not None:
+            sys.stdout.flush()
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
 
 
 def _one_line(error) -> str:
@@ -167,7 +231,8 @@ def _say(sentence: str, status: int, debug: bool = False) -> int:
         import traceback
 
         traceback.print_exc()
-    print(f"headshop: {sentence}", file=sys.stderr)
+    with suppress(OSError):  # nobody reads it
+        print(f"headshop: {sentence}", file=sys.stderr)
     return status
 
 

@@ -52,7 +52,7 @@ def build(options) -> None:
         _write_plain(skin, plain, outputs)
     if not options.quiet:
         print(f"{options.output}: {report['fit']['sentence']}")
-        _say_if_guessed(report["scan"])
+        _say_if_unsure(report["scan"])
         if report["fit"]["advice"]:
             print(report["fit"]["advice"])
 
@@ -73,15 +73,17 @@ def landmarks(options) -> None:
         write_landmarks(file, back, found.missing, found.confidence, found.mid_air)
     if not options.quiet:
         print(f"{options.output}: {found.summary()}")
-        _say_if_guessed(scan.report)
+        _say_if_unsure(scan.report)
 
 
-def _say_if_guessed(scan: dict) -> None:
-    """Tell whoever knows better that nothing but the face tells the size of the ``scan``, a report's block."""
+def _say_if_unsure(scan: dict) -> None:
+    """Tell whoever knows better that unit or axes of the ``scan``, a report's block, are doubtful, or a mere guess."""
     from ..sim.scan.units import BY_FACE
 
     if scan["unit"] == BY_FACE:
         print(f"{scan['orientation']} If you know how long a unit is, give it: --units MILLIMETRES.")
+    elif not scan["certain"]:
+        print(scan["orientation"])
 
 
 def bake(options) -> None:
@@ -90,10 +92,6 @@ def bake(options) -> None:
     if options.poses is None and options.performance is None:
         raise InputError(
             "There is nothing to bake: give --set muscles, --set expressions, --set arkit, --set rig or --performance FILE."
-        )
-    if options.poses == "facs":
-        raise InputError(
-            f"The set {options.poses} is not in this version: bake --set muscles, expressions, arkit or rig."
         )
     if options.dynamic and options.performance is None:
         raise InputError("Only a performance moves in time: give --performance FILE, or leave out --dynamic.")

@@ -97,7 +97,7 @@ def load_scan_alone(path, unit: str | None = None, up: str | None = None) -> Wor
         work = find_landmarks(mesh, unit_scales=list(units.values()), any_size=unit is None)
         found = yield from portion(work, 0.05, 1.0)
         name = next((name for name, scale in units.items() if scale == found.unit_scale), BY_FACE)
-        axes = detect(mesh, found.positions, unit=found.unit_scale, up=up, called=name)
+        axes = detect(mesh, found.positions, unit=found.unit_scale, up=up, called=name, picked=False)
     return _upright(mesh, counts, axes, unit, seconds), found.placed(axes.turn(found.positions))
 
 

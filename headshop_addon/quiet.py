@@ -18,18 +18,18 @@ def quiet():
 
     Where there is no terminal to print to, as in a windowed program, nothing is redirected.
     """
-    with _patient(), _redirected() as text:
+    with patient(), _redirected() as text:
         yield text
 
 
 @contextmanager
-def _patient():
+def patient():
     """Ctrl-C and the like take effect at the end instead of in the middle."""
     struck, before = [], {}
     try:
         for number in (signal.SIGINT, signal.SIGTERM):
             if callable(signal.getsignal(number)):  # a handler of Python's; Blender's own are left alone
-                before[number] = signal.signal(number, lambda *_: struck.append(True))
+                before[number] = signal.signal(number, lambda number, _: struck.append(number))
     except ValueError:  # not the main thread: no signals arrive here
         yield
         return
@@ -38,8 +38,8 @@ def _patient():
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
-        if struck:
-            raise KeyboardInterrupt
+        for number in struck[:1]:
+            signal.raise_signal(number)
 
 
 @contextmanager

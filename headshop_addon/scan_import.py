@@ -5,7 +5,6 @@ Blender's PLY importer accepts truncated files without a word, so PLY does not g
 scene of their own: the current scene, its selection and all datablocks are left as they were.
 """
 
-import struct
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -20,6 +19,7 @@ from ..sim.errors import InputError
 from ..sim.mesh import Mesh
 from ..sim.scan.ply import read_ply
 from ..sim.scan.texture import has_pictures, vertex_colours
+from ..sim.scan.whole_files import require_whole
 from . import bridge
 from .quiet import quiet
 from .scan_texture import with_pictures
@@ -99,7 +99,7 @@ def read_scan(path) -> Mesh:
         return read_ply(path)
     if is_range_map(path):
         return to_mesh(read_range_map(path))
-    _check_length(path, extension)
+    require_whole(path)
     with _scratch_scene() as scene:
         with quiet() as printed:
             try:
@@ -116,27 +116,14 @@ def read_scan(path) -> Mesh:
     return scan.moved(scan.vertices @ _FILE_AXES[extension].T) if extension in _FILE_AXES else scan
 
 
-def _check_length(path: Path, extension: str) -> None:
-    """Refuse binary STL and GLB files that are shorter than their headers say; Blender reads what is left of them."""
-    size = path.stat().st_size
-    with path.open("rb") as stream:
-        start = stream.read(84)
-    wanted = size
-    if extension == ".stl" and not start.lstrip().startswith(b"solid"):
-        wanted = 84 + 50 * struct.unpack_from("<I", start, 80)[0] if len(start) == 84 else 84
-    elif extension == ".glb":
-        wanted = struct.unpack_from("<I", start, 8)[0] if start[:4] == b"glTF" and len(start) >= 12 else 12
-        if start[:4] != b"glTF":
-            raise InputError(f"{path} is not a GLB file although it is named so: export the scan again.")
-    if size < wanted:
-        raise InputError(f"{path} is cut off: it has {size} bytes of {wanted}; copy or export the scan again.")
-
-
 def _reason(error: Exception, printed: str) -> str:
-    """The last thing said about an error, without Blender's prefixes."""
+    """The last thing said about an error, without Blender's prefixes; of USD's, which come before Blender's, the first."""
     lines = [line.strip() for line in f"{printed}\n{error}".splitlines() if line.strip()]
+    first = next((line for line in lines if line.startswith("Runtime Error: in ") and " -- " in line), None)
+    if first is not None:
+        return first.partition(" -- ")[2].rstrip(".")[:160]
     said = next((line for line in reversed(lines) if "rror" in line), lines[-1] if lines else "no reason given")
-    return said.rpartition("Error: ")[2].rstrip(".").strip()[:160]
+    return said.rpartition("Error: ")[2].rstrip(".").strip().removesuffix(", see console for detail")[:160]
 
 
 @contextmanager

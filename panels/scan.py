@@ -9,7 +9,7 @@ from ..headshop_addon import active, heads
 from .common import SidebarPanel, hint, needs, progress
 
 #: What cleaning counts that an artist may want to know.
-_FAULTS = ("nonfinite_vertices", "nonfinite_faces", "zero_area_faces", "duplicate_faces")
+_FAULTS = ("nonfinite_vertices", "nonfinite_faces", "stray_vertices", "zero_area_faces", "duplicate_faces")
 
 
 class HEADSHOP_PT_scan(SidebarPanel, bpy.types.Panel):

@@ -35,6 +35,13 @@ def test_file_round_trip(tmp_path):
     assert json.loads(path.read_text())["format"] == FORMAT
 
 
+def test_a_byte_order_mark_is_no_fault(tmp_path):
+    path = tmp_path / "smile.json"
+    write_performance(path, sample_performance())
+    path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes())
+    assert read_performance(path) == sample_performance()
+
+
 def test_sample_smile_begins_and_ends_at_rest_and_blinks():
     smile = sample_performance("smile")
     assert 2.0 <= smile.duration <= 3.0 and smile.fps == 24
@@ -58,6 +65,8 @@ def test_sample_smile_begins_and_ends_at_rest_and_blinks():
         ({"format": FORMAT, "channels": {"a": [[1, 0], [0, 0]]}}, "rise"),
         ({"format": FORMAT, "channels": {"a": [[-1, 0], [0, 0]]}}, "between"),
         ({"format": FORMAT, "channels": {"a": [[0, float("nan")]]}}, "pairs"),
+        ({"format": FORMAT, "channels": {"a": [[0, 10**400]]}}, "pairs"),
+        ({"format": FORMAT, "fps": 10**400, "channels": {"a": [[0, 0]]}}, "fps"),
     ],
 )
 def test_bad_documents_say_what_to_do(document, word):
@@ -71,5 +80,8 @@ def test_bad_files(tmp_path):
     (tmp_path / "bad.json").write_text("{")
     with pytest.raises(InputError, match="not a JSON"):
         read_performance(tmp_path / "bad.json")
+    (tmp_path / "deep.json").write_text("[" * 100_000)
+    with pytest.raises(InputError, match="not a JSON"):
+        read_performance(tmp_path / "deep.json")
     with pytest.raises(InputError, match="sample"):
         sample_performance("sneeze")

@@ -30,6 +30,12 @@ def test_unknown_muscle_is_named(model):
         control(model, Pose({"smile_muscle": 1.0}))
 
 
+@pytest.mark.parametrize("pose", [Pose({"masseter_l": float("nan")}), Pose(jaw_open=float("inf"))])
+def test_what_is_no_number_is_named(model, pose):
+    with pytest.raises(InputError, match="'masseter_l' to nan|'jaw_open' to inf"):
+        control(model, pose)
+
+
 def test_jaw_muscles_move_the_jaw(model):
     both = {"digastricus_l": 1.0, "digastricus_r": 1.0}
     opened = control(model, Pose(both)).jaw[0]

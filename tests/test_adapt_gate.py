@@ -6,12 +6,20 @@ import pytest
 
 from headshop.sim.adapt.arrangement import Faces
 from headshop.sim.adapt.closest import Surface
-from headshop.sim.adapt.gate import check_against_scan, check_arrangement, check_likeness, check_on_surface
+from headshop.sim.adapt.gate import (
+    check_against_scan,
+    check_arrangement,
+    check_likeness,
+    check_on_face,
+    check_on_surface,
+)
 from headshop.sim.adapt.landmarks import read_landmarks
 from headshop.sim.adapt.relief import face_likeness
 from headshop.sim.anatomy.landmark_names import SKIN, mirrored
 from headshop.sim.errors import InputError
+from headshop.sim.landmarks.first_look import first_look
 from headshop.sim.mesh_subdivision import drawn
+from headshop.sim.progress import finish
 from headshop.sim.scan.clean import clean_scan
 from headshop.sim.scan.ply import read_ply
 
@@ -64,6 +72,31 @@ def test_those_of_another_head_do_not(people, reference, few):
     assert sum("another head" in sentence for sentence in caught.values()) > 6
 
 
+def test_beside_the_surface_and_off_the_face_at_once_is_anothers(reference):
+    """Either alone may be an error of picking, or an unusual face."""
+    surface = Surface(reference.skin.vertices, reference.skin.triangles)
+    laid = reference.landmark_positions()
+    beside = {n: p + [0.0, -4.0, 0.0] for n, p in laid.items()}
+    check_on_face(beside, laid, surface)
+    check_on_face(laid, {n: p + 9.0 for n, p in laid.items()}, surface)
+    off = {n: p + 9.0 for n, p in laid.items()}
+    assert "another head's" in _refusal(check_on_face, beside, off, surface)
+    check_on_face({n: beside[n] for n in ("ex_l", "ex_r", "prn", "gn")}, off, surface)
+
+
+@pytest.mark.parametrize(("mine", "whose"), [("menpo_james", "fran_cyberware"), ("fran_cyberware", "menpo_james")])
+def test_those_of_somebody_else_in_the_same_place_do_not(people, reference, mine, whose):
+    """They come so near that the surface alone does not tell."""
+    surface = people[mine][0]
+    for name in (mine, whose):
+        marks = people[name][1]
+        laid = finish(first_look(reference, surface, marks)).laid
+        if name == mine:
+            check_on_face(marks, laid, surface)
+        else:
+            assert "another head's" in _refusal(check_on_face, marks, laid, surface)
+
+
 @pytest.mark.parametrize("name", SCANS)
 def test_exchanged_sides_and_pairs_are_named(people, reference, name):
     """All sides, and every single pair."""
@@ -111,7 +144,7 @@ def test_of_landmarks_that_nobody_picked_none_is_to_be_placed_again(reference):
 def test_wrong_units_are_named(people, reference, factor, unit):
     surface, marks = people["lps_infinite"]
     said = _refusal(check_against_scan, {n: p / factor for n, p in marks.items()}, surface)
-    assert f"landmarks were in {unit}" in said and f"{factor:g}" in said
+    assert f"landmarks were in {unit}" in said and f"{factor:g}" in said and "--units" in said
     small = Surface(surface.vertices / factor, surface.triangles)
     said = _refusal(check_against_scan, marks, small)
     assert f"scan were in {unit}" in said

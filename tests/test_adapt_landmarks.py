@@ -2,12 +2,13 @@
 """Landmark files and the gate: what is legal is read, each fault gets its own sentence."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from headshop.sim.adapt.gate import check_against_scan, check_arrangement
-from headshop.sim.adapt.landmarks import read_landmarks, write_landmarks
+from headshop.sim.adapt.landmarks import read_landmark_file, read_landmarks, write_landmarks
 from headshop.sim.anatomy.landmark_names import SKIN, mirrored
 from headshop.sim.errors import InputError
 from headshop.sim.mesh import Mesh
@@ -67,6 +68,7 @@ def test_missing_landmarks_are_left_out_and_other_keys_tolerated(tmp_path):
         ({"landmarks": FACE | {"prn": [1.0, 2.0]}}, ['"prn"', "three numbers"]),
         ({"landmarks": FACE | {"prn": [1.0, 2.0, True]}}, ['"prn"', "three numbers"]),
         ({"landmarks": FACE | {"prn": [1.0, 2.0, float("nan")]}}, ['"prn"', "finite"]),
+        ({"landmarks": FACE | {"prn": [1.0, 2.0, 10**400]}}, ['"prn"', "finite"]),
         ({"landmarks": FACE | {"n": FACE["prn"]}}, ["same place"]),
         ({"landmarks": dict(list(FACE.items())[:3])}, ["3 landmarks", "at least 4"]),
         ({"landmarks": {n: [p[0], 0.0, p[2]] for n, p in FACE.items()}}, ["in one plane", "prn"]),
@@ -94,6 +96,11 @@ def test_files_that_are_none(tmp_path):
     twice = tmp_path / "twice.json"
     twice.write_text('{"format": "headshop-landmarks/1", "landmarks": {"n": [0, 0, 0], "n": [1, 1, 1]}}')
     assert '"n" twice' in _said(twice)
+
+
+def test_a_confidence_beyond_every_number_is_none(tmp_path):
+    path = _file(tmp_path, confidence={"prn": 10**400}, mid_air=[])
+    assert read_landmark_file(path).found == {}
 
 
 def _points(scale=1.0, shift=(0, 0, 0)):
@@ -147,3 +154,9 @@ def test_arrangements_that_are_no_face():
     ):
         with pytest.raises(InputError, match=word):
             check_arrangement(reference, changed)
+
+
+def test_every_landmark_is_documented():
+    text = (Path(__file__).resolve().parents[1] / "docs" / "landmarks.md").read_text()
+    bases = {name.removesuffix("_l").removesuffix("_r") for name in SKIN}
+    assert [name for name in bases if f"| `{name}` |" not in text] == []

@@ -87,3 +87,13 @@ def test_a_binary_stl_that_is_cut_off(bpy, tmp_path, bowl):
     path.write_bytes(path.read_bytes()[:-70])
     with pytest.raises(InputError, match="cut off"):
         scan_import.read_scan(path)
+
+
+def test_why_a_usd_file_cannot_be_read_is_said(bpy, tmp_path):
+    from headshop.headshop_addon import scan_import
+
+    path = tmp_path / "scan.usdc"
+    path.write_bytes(b"PXR-USDC" + bytes(200))
+    with pytest.raises(InputError, match="cannot be read as USDC") as caught:
+        scan_import.read_scan(path)
+    assert "console" not in str(caught.value)

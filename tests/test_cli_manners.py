@@ -5,14 +5,17 @@ import functools
 import io
 import os
 import signal
+import subprocess
 import sys
 
 import pytest
 
-from headshop.headshop_addon.command_line import main
+from headshop.headshop_addon.command_line import main, parser
 from headshop.headshop_addon.progress_bar import progress_bar
 from headshop.headshop_addon.quiet import quiet
+from headshop.sim.landmarks.find import FoundLandmarks
 from headshop.sim.progress import Progress
+from headshop.sim.scan.ply import write_ply
 
 
 def test_quiet_holds_back_what_is_printed(capfd):
@@ -87,3 +90,47 @@ def test_the_sample_needs_no_blender(reference, tmp_path, monkeypatch, capfd):
     assert main(["sample", "-o", str(tmp_path / "s")]) == 0
     assert sorted(path.name for path in (tmp_path / "s").iterdir()) == ["landmarks.json", "scan.ply", "truth.ply"]
     assert "scan.ply" in capfd.readouterr().out
+
+
+def test_names_that_the_terminal_cannot_show_are_printed_escaped(reference, tmp_path, monkeypatch):
+    from headshop.sim.scan import sample
+
+    monkeypatch.setattr(sample, "make_sample", functools.partial(sample.make_sample, levels=1))
+    monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(io.BytesIO(), encoding="cp1252"))
+    assert main(["sample", "-o", str(tmp_path / "скан")]) == 0
+    assert b"\\u0441" in sys.stdout.buffer.getvalue()
+
+
+def test_whoever_reads_may_go(blender):
+    read, write = os.pipe()
+    os.close(read)
+    done = subprocess.run([sys.executable, "-m", "headshop", "--version"], stdout=write, stderr=subprocess.PIPE)
+    os.close(write)
+    assert (done.returncode, done.stderr) == (0, b"")
+
+
+def test_nothing_that_takes_long_is_imported_before_ctrl_c_is_quiet():
+    code = "import sys, headshop.headshop_addon.command_line; sys.exit('numpy' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code]).returncode == 0
+
+
+@pytest.mark.parametrize("text", ["z", "+Z", "Z"])
+def test_axes_may_be_written_as_the_report_does(text):
+    assert parser().parse_args(["landmarks", "a.ply", "-o", "a.json", "--up", text]).up == "Z"
+
+
+@pytest.mark.parametrize(("up", "doubt"), [("Z", False), ("-Z", True)])
+def test_doubtful_axes_are_told(bpy, reference, tmp_path, monkeypatch, capfd, up, doubt):
+    from headshop.headshop_addon import pipeline
+
+    def found(mesh, **options):
+        yield Progress(0.5, "")
+        places = reference.landmark_positions()
+        return FoundLandmarks(places, dict.fromkeys(places, 0.9), (), ())
+
+    monkeypatch.setattr(pipeline, "find_landmarks", found)
+    write_ply(tmp_path / "scan.ply", reference.skin)
+    assert main(["landmarks", str(tmp_path / "scan.ply"), "-o", str(tmp_path / "found.json"), f"--up={up}"]) == 0
+    out = capfd.readouterr().out
+    assert ("by the landmarks that were found the head is turned by 180 degrees" in out) == doubt
+    assert out.count("\n") == 1 + doubt

@@ -4,11 +4,13 @@
 import json
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from headshop.headshop_addon.command_line import main
+from headshop.headshop_addon.plain_files import FILES
 from headshop.sim.acting import expressions
 from headshop.sim.adapt.landmarks import write_landmarks
 from headshop.sim.anatomy.seen_skin import seen_skin
@@ -72,6 +74,16 @@ def test_build(built, reference):
     assert np.median(np.linalg.norm(skin - seen_skin(reference).vertices, axis=1)) < 1.3
     names = {path.name for path in built.iterdir()}
     assert "shapes.npz" not in names and not any(name.startswith(".") or name.endswith("blend1") for name in names)
+
+
+def test_every_key_of_the_report_is_documented(built):
+    text = (Path(__file__).resolve().parents[1] / "docs" / "report.md").read_text()
+    report = json.loads((built / "report.json").read_text())
+    names = [*report, *FILES]
+    for block in ("scan", "fit", "anatomy", "seconds", "versions"):
+        names += report[block]
+    names += [name for block in ("left_out_mm2", "detail") for name in report["fit"][block]]
+    assert [name for name in names if f"`{name}`" not in text] == []
 
 
 def test_bake_after_saving_and_export(built, monkeypatch):

@@ -146,6 +146,23 @@ def bad_files(folder):
     yield "prose.json", b"Dear map", "no JSON"
     yield "marks.json", json.dumps({"format": "headshop-landmarks/1"}).encode(), "describes no range map"
     frame = {"format": "headshop-range/1", "radius": "r.png", "height_step": 1.0}
+    np.savez(folder / "nothing.npz", height_step=1.0)
+    yield "nothing.npz", None, "docs/fitting.md"
+    yield "dot.json", json.dumps(frame | {"radius": "."}).encode(), "no file"
+    yield "unnamed.json", json.dumps(frame | {"radius": ""}).encode(), "no file"
+    yield "nil.json", json.dumps(frame | {"radius": "r\0.png"}).encode(), "no file"
+    (folder / "good.png").write_bytes(png_bytes(np.ones((4, 6), np.uint16)))
+    good = frame | {"radius": "good.png"}
+    yield "number.json", json.dumps(good | {"colour": 5}).encode(), "no file"
+    yield "large.json", json.dumps(good | {"height_step": 10**400}).encode(), "not a number"
+    yield "larger.json", json.dumps(good | {"radius_unit_mm": 10**400}).encode(), "no number of mm"
+    (folder / "picture.tif").write_bytes(b"II*\0")
+    yield "picture.json", json.dumps(frame | {"radius": "picture.tif"}).encode(), "not a PNG image: save it as one"
+    header = png_bytes(np.ones((4, 6), np.uint8))
+    (folder / "palette.png").write_bytes(header[:25] + b"\3" + header[26:])
+    yield "palette.json", json.dumps(frame | {"radius": "palette.png"}).encode(), "palette"
+    (folder / "vast.png").write_bytes(header[:16] + b"\0\1\0\0" * 2 + header[24:])
+    yield "vast.json", json.dumps(frame | {"radius": "vast.png"}).encode(), "more than is read"
     yield "alone.json", json.dumps(frame | {"radius": "gone.png"}).encode(), "cannot be read"
     (folder / "r.png").write_bytes(png_bytes(np.ones((4, 6), np.uint8)))
     yield "eight.json", json.dumps(frame).encode(), "16 bits"
@@ -163,6 +180,18 @@ def test_bad_files_get_one_sentence_each(tmp_path):
         assert name.split(".")[0] in str(caught.value) or "r.png" in str(caught.value) or "gone" in str(caught.value)
     with pytest.raises(InputError, match="no name of a range map"):
         write_range_map(tmp_path / "a.ply", bumpy())
+
+
+def test_the_images_of_a_description_may_lie_in_another_folder(tmp_path):
+    made = bumpy()
+    write_range_map(tmp_path / "a.json", made)
+    (tmp_path / "sub").mkdir()
+    document = json.loads((tmp_path / "a.json").read_text())
+    for image in ("radius", "colour"):
+        (tmp_path / document[image]).rename(tmp_path / "sub" / document[image])
+        document[image] = "sub/" + document[image]
+    (tmp_path / "a.json").write_text(json.dumps(document))
+    assert np.array_equal(read_range_map(tmp_path / "a.json").valid, made.valid)
 
 
 def test_the_import_takes_maps_for_scans(bpy, tmp_path):

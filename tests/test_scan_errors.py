@@ -6,8 +6,10 @@ import pytest
 
 from headshop.sim.errors import InputError
 from headshop.sim.mesh import Mesh
+from headshop.sim.scan import whole_files
 from headshop.sim.scan.clean import clean_scan
 from headshop.sim.scan.ply import read_ply
+from headshop.sim.scan.whole_files import require_whole
 
 
 def _dome(n=20):
@@ -67,6 +69,7 @@ def test_each_fault_is_removed_and_counted():
         "nonfinite_vertices": 2,
         "nonfinite_faces": 1,
         "welded_vertices": 1,
+        "stray_vertices": 0,
         "zero_area_faces": 2,
         "duplicate_faces": 2,
         "turned_faces": 0,
@@ -79,6 +82,33 @@ def test_each_fault_is_removed_and_counted():
     seam = np.flatnonzero((mesh.vertices == points[7]).all(axis=1))
     np.testing.assert_allclose(mesh.colour[seam], [[0.625] * 3])
     assert np.delete(mesh.colour, seam, axis=0).max() == 0.5
+
+
+@pytest.mark.parametrize("away", [1_000.0, 1e6, 1e30])
+@pytest.mark.parametrize("soup", [False, True])
+def test_stray_vertices_are_dropped_with_their_faces(away, soup):
+    points, triangles = _dome()
+    whole, _ = clean_scan(Mesh.from_triangles(points, triangles))
+    gone = np.isin(triangles, [150, 205]).any(axis=1)
+    points[[150, 205]] += [[0, 0, away], [-away, 0, 9]]
+    scan = Mesh.from_triangles(points, triangles)
+    if soup:
+        scan = Mesh.from_triangles(points[triangles].reshape(-1, 3), np.arange(3 * len(triangles)))
+    mesh, counts = clean_scan(scan)
+    assert (counts["stray_vertices"], counts["unused_vertices"], counts["vertices"]) == (2, 0, 398)
+    assert counts["triangles"] == (~gone).sum() and np.isin(mesh.vertices, whole.vertices).all()
+
+
+def test_a_wall_far_behind_is_no_stray():
+    """Decimated to two triangles, with jumps drawn from the rim of the head to its corners."""
+    points, triangles = _dome()
+    wall = np.array([[-2000, -2000, -3000], [2000, -2000, -3000], [2000, 2000, -3000], [-2000, 2000, -3000.0]])
+    rims = [np.arange(20) * 20, 380 + np.arange(20), np.arange(400)[::-20], np.arange(20)[::-1]]
+    jumps = [[a, b, 400 + k] for k, rim in enumerate(rims) for a, b in zip(rim, rim[1:], strict=False)]
+    corners = [[rim[-1], 400 + k, 400 + (k + 1) % 4] for k, rim in enumerate(rims)]
+    faces = np.concatenate([triangles, jumps, corners])
+    _, counts = clean_scan(Mesh.from_triangles(np.concatenate([points, wall]), faces))
+    assert counts["stray_vertices"] == 0 and counts["triangles"] == len(faces)
 
 
 def test_triangles_wound_the_other_way_than_their_neighbours_are_turned():
@@ -150,3 +180,39 @@ def test_real_scans_pass(shared, name):
     assert counts["triangles"] == len(raw.triangles) - counts["zero_area_faces"] - counts["duplicate_faces"]
     if name == "lps_infinite":
         assert counts["welded_vertices"] > 0 and counts["components"] == 1
+
+
+_SOLID = b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\n"
+_BINARY = b"solid, but not a text\0".ljust(80) + (2).to_bytes(4, "little") + bytes(100)
+_OBJ = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nf 1//1 2//1 \\\n 3//1 # 9\nf -3 -2 -1\n"
+
+
+@pytest.mark.parametrize(
+    ("name", "data", "says"),
+    [
+        ("a.stl", _SOLID + b"endsolid a\n", None),
+        ("a.stl", _SOLID + b"END SOLID a with a long name\n\n" + _SOLID + b"endsolid", None),
+        ("a.stl", _BINARY, None),
+        ("a.stl", _SOLID, "cut off: it does not end with endsolid"),
+        ("a.stl", _SOLID + b"endsolid a\n" + _SOLID[:60], "cut off: it does not end with endsolid"),
+        ("a.stl", _BINARY[:-1], "cut off: it has 183 bytes of 184"),
+        ("a.stl", b"v 1 2 3\n" * 99, "not an STL file"),
+        ("a.stl", b"letter", "not an STL file"),
+        ("a.obj", _OBJ, None),
+        ("a.obj", _OBJ + b"f 1 2 4\n", "a face names a vertex"),
+        ("a.obj", _OBJ + b"f 1 2 0\n", "a face names a vertex"),
+        ("a.obj", _OBJ + b"f 1/9 2/9 -4/9\n", "a face names a vertex"),
+        ("a.glb", b"glTF\2\0\0\0\x40\0\0\0", "cut off: it has 12 bytes of 64"),
+        ("a.glb", b"glTF\2\0\0\0\x0c\0\0\0", None),
+    ],
+)
+@pytest.mark.parametrize("block", [1, 1 << 24])
+def test_files_that_are_not_whole_are_refused(tmp_path, monkeypatch, name, data, says, block):
+    monkeypatch.setattr(whole_files, "_BLOCK", block)
+    path = tmp_path / name
+    path.write_bytes(data)
+    if says is None:
+        require_whole(path)
+        return
+    with pytest.raises(InputError, match=says):
+        require_whole(path)

@@ -67,6 +67,20 @@ def test_the_landmarks_are_believed_even_against_the_shape(reference, skin):
     assert (found.up, found.front) == ("-Z", "-Y")
 
 
+def test_the_reason_names_whose_landmarks_they_are(reference, skin):
+    places = reference.landmark_positions()
+    assert detect(skin, places).reason.endswith(": the landmarks say so.")
+    assert detect(skin, places, picked=False).reason.endswith(": the landmarks that were found say so.")
+    over = detect(skin, places, up="-Z")
+    assert not over.certain and "but by the landmarks the head is turned by" in over.reason
+
+
+def test_a_unit_that_makes_no_head_is_refused_although_it_is_told(skin):
+    for unit in (1e-300, "m"):
+        with pytest.raises(InputError, match="which is no head"):
+            detect(skin, unit=unit)
+
+
 def test_what_is_told_is_not_questioned(skin):
     told = detect(skin, unit="cm", up="y", front="-X")
     assert (told.unit_scale, told.up, told.front, told.certain) == (10.0, "+Y", "-X", True)

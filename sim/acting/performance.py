@@ -20,6 +20,7 @@ import numpy as np
 
 from ..anatomy.storage import write_atomically
 from ..errors import InputError
+from ..finite_numbers import is_number
 from .outer import OUTER
 from .pose import Pose, pose_from
 
@@ -99,12 +100,12 @@ def read_performance(path) -> Performance:
     """
     path = Path(path)
     try:
-        document = json.loads(path.read_text(encoding="utf-8"))
+        document = json.loads(path.read_text(encoding="utf-8-sig"))
     except FileNotFoundError:
         raise InputError(f"There is no performance file {path}: check the path.") from None
     except OSError as error:
         raise InputError(f"{path} cannot be read ({error.strerror}): check the path and its permissions.") from None
-    except ValueError:
+    except (ValueError, RecursionError):
         raise InputError(f"{path} is not a JSON file: export the performance again.") from None
     return performance_from(document, str(path))
 
@@ -114,7 +115,7 @@ def performance_from(document, where: str = "The performance") -> Performance:
     if not isinstance(document, dict) or document.get("format") != FORMAT:
         raise InputError(f'{where} is not a performance: it must say "format": "{FORMAT}".')
     fps = document.get("fps", 24)
-    if not _is_number(fps) or not 0 < fps <= 1000:
+    if not is_number(fps) or not 0 < fps <= 1000:
         raise InputError(f'{where}: "fps" must be a number of frames per second over 0, not {fps!r}.')
     channels = document.get("channels")
     if not isinstance(channels, dict) or not channels:
@@ -124,7 +125,7 @@ def performance_from(document, where: str = "The performance") -> Performance:
     out = {}
     for name, keys in channels.items():
         good = isinstance(keys, list) and all(
-            isinstance(k, list) and len(k) == 2 and all(map(_is_number, k)) for k in keys
+            isinstance(k, list) and len(k) == 2 and all(map(is_number, k)) for k in keys
         )
         if not good or not keys:
             raise InputError(f"{where}: channel {name!r} must be a list of [time in seconds, value] pairs of numbers.")
@@ -140,10 +141,6 @@ def performance_from(document, where: str = "The performance") -> Performance:
     if not isinstance(seed, int) or isinstance(seed, bool) or seed < 0:
         raise InputError(f'{where}: "seed" must be a whole number from 0 up, not {seed!r}.')
     return Performance(out, float(fps), str(document.get("name", "performance")), seed)
-
-
-def _is_number(x) -> bool:
-    return isinstance(x, int | float) and not isinstance(x, bool) and math.isfinite(x)
 
 
 def write_performance(path, performance: Performance) -> None:

@@ -90,8 +90,11 @@ def control(model: Model, pose: Pose) -> Control:
 
     Raises
     ------
-    InputError : the pose names a muscle that the model does not have.
+    InputError : the pose names a muscle that the model does not have, or a value is not a finite number.
     """
+    for name, value in pose.values().items():
+        if not np.isfinite(value):
+            raise InputError(f"The pose sets {name!r} to {value}: give a finite number.")
     index = {name: k for k, name in enumerate(model.muscle_names)}
     activation = np.zeros(len(index))
     for name, value in pose.muscles.items():

@@ -19,7 +19,7 @@ from .bone import depth_under
 from .closest import Surface
 from .fit_sentence import MOST, SMILES_CLOSED, fit_sentence, fitted_shares, invented
 from .follow import follow
-from .gate import check_against_scan, check_arrangement, check_likeness, check_on_surface
+from .gate import check_against_scan, check_arrangement, check_likeness, check_on_face, check_on_surface
 from .landmarks import require_usable
 from .rest import BONES, rest_of
 from .scan_surface import near_head, to_leave_out, without_cuts, without_jumps
@@ -97,6 +97,7 @@ def build_head(
     yield Progress(0.08, "Judging the landmarks")
     check_on_surface(given, target)
     look = yield from portion(first_look(reference, target, given, out, found, scan), 0.1, 0.3)
+    check_on_face({n: p for n, p in given.items() if n not in found}, look.laid, target)
     fit = yield from portion(fit_skin(reference, look.filled, look.landmarks, look.lips, found, look.guessed), 0.3, 0.6)
     fit = look.seen_only(fit)
     yield Progress(0.6, "Judging the fit")

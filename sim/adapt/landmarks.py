@@ -17,6 +17,7 @@ from ..anatomy import landmark_names
 from ..anatomy.landmark_names import LABELS, SKIN
 from ..anatomy.storage import write_atomically
 from ..errors import InputError
+from ..finite_numbers import is_number
 from ..landmarks.sure import SURE
 from .thin_plate_spline import flatness
 
@@ -61,12 +62,11 @@ def _position(path, name, value) -> np.ndarray:
     numeric = isinstance(value, list) and len(value) == 3
     if not numeric or not all(isinstance(x, (int, float)) and not isinstance(x, bool) for x in value):
         raise InputError(f'{path}: landmark "{name}" is not three numbers [x, y, z]: give its place in mm.')
-    point = np.array(value, dtype=float)
-    if not np.isfinite(point).all():
+    if not all(map(is_number, value)):
         raise InputError(
             f'{path}: landmark "{name}" is not a finite number: give its place in mm, or list it under "missing".'
         )
-    return point
+    return np.array(value, dtype=float)
 
 
 def _once(pairs):
@@ -143,7 +143,7 @@ def _found(document) -> dict[str, float]:
         return {}
     given, places = document["landmarks"], document.get("found")
     same = {n for n in given if not isinstance(places, dict) or places.get(n) == given[n]}
-    sure = {n: float(c) for n, c in confidence.items() if n in same and isinstance(c, (int, float))}
+    sure = {n: float(c) for n, c in confidence.items() if n in same and is_number(c)}
     return sure | {n: 0.0 for n in mid_air if isinstance(n, str) and n in same}
 
 

@@ -18,12 +18,14 @@ The first row is at the top and columns run from the subject's right to the left
 
 import io
 import json
+import os
 from pathlib import Path
 
 import numpy as np
 
 from ..anatomy.storage import write_atomically
 from ..errors import InputError
+from ..finite_numbers import is_number
 from .echo_file import colour_path, echo_bytes, is_echo, parse_echo, with_colour
 from .png_image import png_bytes, read_png
 from .range_map import TURN, RangeMap
@@ -151,7 +153,9 @@ def _from_npz(path: Path) -> RangeMap:
             raise InputError(f"{path} is no .npz file of arrays, or damaged: save it again with numpy.savez.") from None
         raise
     if "radius" not in given or given["radius"].ndim != 2 or given["radius"].dtype.kind not in "fiu":
-        raise InputError(f"{path} has no array radius (rows, columns) of numbers: see the range map formats.")
+        raise InputError(
+            f"{path} has no array radius (rows, columns) of numbers: add it (docs/fitting.md lists all arrays)."
+        )
     colour = given.get("colour")
     if colour is not None and colour.dtype.kind in "ui":
         colour = colour.astype(np.float32) / np.iinfo(colour.dtype).max
@@ -165,19 +169,27 @@ def _from_json(path: Path) -> RangeMap:
         raise InputError(f"{path} is no JSON: give the description of a range map ({FORMAT}).") from None
     if not isinstance(given, dict) or given.get("format") != FORMAT or not isinstance(given.get("radius"), str):
         raise InputError(f'{path} describes no range map: it needs "format": "{FORMAT}" and "radius": a 16-bit PNG.')
-    beside = path.with_name(given["radius"])
+    beside = _beside(path, given["radius"])
     pixels = read_png(_bytes(beside), str(beside))
     if pixels.dtype != np.uint16 or pixels.shape[2] > 2:
         raise InputError(f"{beside} is not a grey PNG of 16 bits: save the ranges as one.")
     unit = given.get("radius_unit_mm", UNIT)
-    if isinstance(unit, bool) or not isinstance(unit, (int, float)) or not 0 < unit < 1000:
+    if not is_number(unit) or not 0 < unit < 1000:
         raise InputError(f'{path} says "radius_unit_mm": {unit!r}, which is no number of mm: correct it.')
     radius = np.where(pixels[..., 0] > 0, pixels[..., 0] * float(unit), np.nan)
     colour = None
     if given.get("colour") is not None:
         made = _assembled(path, radius, None, given)
-        return with_colour(made, _image(path.with_name(str(given["colour"]))))
+        return with_colour(made, _image(_beside(path, given["colour"])))
     return _assembled(path, radius, colour, given)
+
+
+def _beside(path: Path, name) -> Path:
+    """The image that the description at ``path`` names, from its folder on."""
+    file = path.parent / name if isinstance(name, str) and "\0" not in name else path.parent
+    if os.path.isdir(file):
+        raise InputError(f"{path} names an image {name!r}, which is no file: give the name of a file beside it.")
+    return file
 
 
 def _assembled(path, radius, colour, given) -> RangeMap:
@@ -210,7 +222,7 @@ def _assembled(path, radius, colour, given) -> RangeMap:
 def _numbers(path, given, key, fallback, shape) -> np.ndarray:
     try:
         value = np.asarray(given.get(key, fallback), dtype=float)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         value = np.array(np.nan)
     if value.shape != shape or not np.isfinite(value).all():
         raise InputError(

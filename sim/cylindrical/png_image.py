@@ -19,18 +19,22 @@ def read_png(data: bytes, name: str) -> np.ndarray:
 
     Raises
     ------
-    InputError : no PNG, damaged, or one with a palette or interlaced.
+    InputError : no PNG, damaged, too large, or one with a palette or interlaced.
     """
     if data[:8] != SIGNATURE:
-        raise InputError(f"{name} is not a PNG image although it is named so: export it again.")
+        named = " although it is named so: export it again" if name.lower().endswith(".png") else ": save it as one"
+        raise InputError(f"{name} is not a PNG image{named}.")
     try:
         w, h, depth, kind, _, _, interlaced = struct.unpack(">IIBBBBB", data[16:29])
-        if kind not in _CHANNELS or depth not in (8, 16) or interlaced:
-            raise InputError(
-                f"{name} is a PNG with a palette, interlaced or of {depth} bits: save it as grey or RGB of 8 or 16 bits."
-            )
-        if not 0 < w * h <= LARGEST:
-            raise InputError(f"{name} measures {w} x {h} pixels, more than is read: reduce it.")
+    except struct.error:
+        raise _damaged(name) from None
+    if kind not in _CHANNELS or depth not in (8, 16) or interlaced:
+        raise InputError(
+            f"{name} is a PNG with a palette, interlaced or of {depth} bits: save it as grey or RGB of 8 or 16 bits."
+        )
+    if not 0 < w * h <= LARGEST:
+        raise InputError(f"{name} measures {w} x {h} pixels, more than is read: reduce it.")
+    try:
         packed, at = [], 8
         while at + 8 <= len(data):
             size, chunk = struct.unpack(">I4s", data[at : at + 8])
@@ -42,8 +46,12 @@ def read_png(data: bytes, name: str) -> np.ndarray:
         raw = np.frombuffer(zlib.decompress(b"".join(packed)), np.uint8)[: h * (w * pixel + 1)]
         rows = _unfiltered(raw.reshape(h, w * pixel + 1), pixel)
     except (struct.error, zlib.error, ValueError):
-        raise InputError(f"{name} is cut off or damaged: copy or export it again.") from None
+        raise _damaged(name) from None
     return rows.view(">u2" if depth == 16 else np.uint8).reshape(h, w, channels).astype(f"u{depth // 8}")
+
+
+def _damaged(name) -> InputError:
+    return InputError(f"{name} is cut off or damaged: copy or export it again.")
 
 
 def _unfiltered(rows: np.ndarray, pixel: int) -> np.ndarray:

@@ -46,7 +46,8 @@ class FirstLook:
     """landmarks : name -> (3,) mm, those given and those of lids that are seen; lips : about where their landmarks are if
     they are parted, if only a little, or None; target : the scan without what the lips hold, hair and glasses; left_out : how
     much of it that is, mm²; filled : with skin behind it, and where it lacks the scalp, as that probably is; hidden (k,) :
-    vertices of the reference's skin that make that up; guessed : name -> (3,) mm, about where others are."""
+    vertices of the reference's skin that make that up; guessed : name -> (3,) mm, about where others are; laid : the same of
+    those given that the face tells, where it has them itself."""
 
     landmarks: dict[str, np.ndarray]
     target: Surface
@@ -55,6 +56,7 @@ class FirstLook:
     left_out: dict[str, float] = field(default_factory=lambda: dict.fromkeys(KINDS, 0.0))
     hidden: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
     guessed: dict[str, np.ndarray] = field(default_factory=dict)
+    laid: dict[str, np.ndarray] = field(default_factory=dict)
 
     def seen_only(self, fit: SkinFit) -> SkinFit:
         """A ``fit`` to the ``filled`` scan, as one to what the scan shows."""
@@ -120,7 +122,8 @@ def first_look(
     untold = (*UNTOLD, "sto") if shown.parted else UNTOLD
     laid, skull = space.landmarks(hair.fit.points), space.landmarks(hair.scalp.points)
     laid |= {n: p for n, p in skull.items() if n.partition("_")[0] in SKULL}
-    laid |= {n: p for n, p in picked(space, hair.fit, coarse).items() if n.partition("_")[0] in EAR_MARKS}
+    places = picked(space, hair.fit, coarse)
+    laid |= {n: p for n, p in places.items() if n.partition("_")[0] in EAR_MARKS}
     guessed = {n: p for n, p in laid.items() if n not in landmarks and n.partition("_")[0] not in untold}
     held, covered = (np.zeros(len(each), dtype=bool) for each in (target.triangles, space.points))
     kept = "hair" not in leave_out and hair.covered.any()
@@ -144,7 +147,8 @@ def first_look(
     filled = with_hidden_skin(space, hair.scalp, unseen & no_ear, filled, UNSEEN)
     areas = (target.area[held].sum(), target.area[shows].sum(), whole.area[worn].sum())
     out = dict(zip(KINDS, map(float, areas), strict=True))
-    return FirstLook(landmarks, left, filled, lips, out, space.vertices[hidden | covered | unseen], guessed)
+    own = {n: places[n] for n in clear if n in places}
+    return FirstLook(landmarks, left, filled, lips, out, space.vertices[hidden | covered | unseen], guessed, own)
 
 
 def _told_of(space, pose, marks):

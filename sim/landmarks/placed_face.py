@@ -21,7 +21,7 @@ from .shape_space import ShapeSpace
 from .verdict import ODD, judged, likeness_of, misfit_of, share_of, weighed
 
 NO_FACE = (
-    "No face is found in the scan: check that it shows one, or give landmarks with --landmarks or by clicking them."
+    "No face is found in the scan: check that it shows one{}, or give landmarks with --landmarks or by clicking them."
 )
 #: mm on the reference by which the nose of an infant's face may lie lower than that of one laid on it upside down.
 LOWER = (0.0, 30.0, 60.0)
@@ -74,7 +74,7 @@ def place_face(mesh: Mesh, reference: Head, space: ShapeSpace, unit_scales, any_
             if scale is not None:
                 return (yield from portion(brought_to(scale), SIZED, 1.0))
             unit_scales = unit_scales or closer
-    raise InputError(NO_FACE)
+    raise InputError(NO_FACE.format("" if any_size else " and that its unit (--units) is right"))
 
 
 def _is_face(look, result) -> bool:

@@ -10,6 +10,7 @@ from scipy.sparse.csgraph import connected_components
 from ..errors import InputError
 from ..mesh import Mesh, cross_sides
 from ..progress import Progress, Work, finish
+from .strays import stray_vertices
 from .texture import has_pictures, triangle_corners
 from .winding import wound_alike
 
@@ -32,9 +33,10 @@ def cleaning(mesh: Mesh) -> Work:
     """Work returning a triangle mesh without NaN vertices, zero-area, duplicate faces and unused vertices; equal ones welded,
     neighbours wound the same way round.
 
-    It returns the mesh (colours kept: the mean of those welded; pictures too) and counts: ``vertices``, ``triangles`` and
+    It returns the mesh (colours kept: the mean of those welded; pictures too) and counts: ``vertices``, ``triangles``,
     ``components`` of the result, what was removed: ``nonfinite_vertices``, ``nonfinite_faces``, ``welded_vertices``,
-    ``zero_area_faces``, ``duplicate_faces``, ``unused_vertices``, and the ``turned_faces``.
+    ``stray_vertices`` with the faces at them, ``zero_area_faces``, ``duplicate_faces``, ``unused_vertices``, and the
+    ``turned_faces``.
 
     Raises
     ------
@@ -53,11 +55,6 @@ def cleaning(mesh: Mesh) -> Work:
     usable = finite[triangles].all(axis=1)
     counts["nonfinite_faces"] = int((~usable).sum())
     triangles, rows = triangles[usable], rows[usable]
-    extent = np.ptp(points[finite], axis=0).max()
-    if not 0 < extent < 1e12:
-        raise InputError(f"The scan measures {extent:g} units across, which is no head in any unit: check the export.")
-    _refuse_far(points[finite], extent)
-
     kept = np.zeros(len(points), dtype=bool)
     kept[triangles.ravel()] = True
     counts["unused_vertices"] = int((finite & ~kept).sum())
@@ -71,6 +68,11 @@ def cleaning(mesh: Mesh) -> Work:
     counts["welded_vertices"] = len(points) - count
     points, colour = _merged(points, colour, same, count)
     triangles = same[triangles]
+    stray = stray_vertices(points, triangles)
+    counts["stray_vertices"] = int(stray.sum())
+    whole = ~stray[triangles].any(axis=1)
+    triangles, rows = triangles[whole], rows[whole]
+    _refuse_extent(points[~stray])
 
     yield Progress(0.5, "Cleaning the scan")
     flat = _flat(points, triangles)
@@ -84,7 +86,7 @@ def cleaning(mesh: Mesh) -> Work:
 
     kept = np.zeros(len(points), dtype=bool)
     kept[triangles.ravel()] = True
-    counts["unused_vertices"] += int((~kept).sum())
+    counts["unused_vertices"] += int((~kept & ~stray).sum())
     triangles = (np.cumsum(kept) - 1)[triangles]
     points, colour = points[kept], None if colour is None else colour[kept]
     if len(triangles) < FEWEST_TRIANGLES:
@@ -146,9 +148,12 @@ def _refuse_hopeless(points, triangles):
         raise InputError("The scan is damaged, a face names a vertex that does not exist: export it again.")
 
 
-def _refuse_far(points, extent):
+def _refuse_extent(points):
     """Blender's numbers, which have 24 bits, are .02 mm apart where a head is `FARTHEST` times its size from the origin."""
-    away = np.linalg.norm((points.min(axis=0) + points.max(axis=0)) / 2)
+    extent = np.ptp(points, axis=0).max() if len(points) else 1.0
+    if not 0 < extent < 1e12:
+        raise InputError(f"The scan measures {extent:g} units across, which is no head in any unit: check the export.")
+    away = np.linalg.norm((points.min(axis=0) + points.max(axis=0)) / 2) if len(points) else 0.0
     if away > FARTHEST * extent:
         raise InputError(
             f"The scan lies {away / extent:,.0f} times its own size from the origin of its coordinates, too far to be exact: "

@@ -81,6 +81,7 @@ def detecting(
     front: str | None = None,
     reference: Head | None = None,
     called: str = CUSTOM,
+    picked: bool = True,
 ) -> Work:
     """Work returning the `Orientation` of a scan: what is given as ``unit``, ``up`` or ``front`` is not questioned.
 
@@ -88,6 +89,7 @@ def detecting(
     Without them the face of the reference head is laid on the scan in all 24 positions, and the best fit wins; if it
     fits in no usual unit, in any size, and the unit is such that the head is as large as the reference.
     called : what a unit is called that is given as a number
+    picked : whether somebody gave the landmarks; the ``reason`` says so
 
     Raises
     ------
@@ -99,10 +101,10 @@ def detecting(
     points = surface_samples(mesh)
     units = units_of(points, unit, called)
     if landmarks is not None:
-        turn, spread = _turn_of_landmarks(landmarks, reference.landmark_positions())
+        turn = _turn_of_landmarks(landmarks, reference.landmark_positions())
         if turn is not None:
             name, scale = unit_of_landmarks(points, landmarks, units, unit is not None)
-            return _by_landmarks(turn, spread, allowed, name, scale)
+            return _by_landmarks(turn, allowed, name, scale, picked)
     template = face_template(reference)
     found = yield from portion(_placements(points, template, allowed, units), 0.0, 0.3)
     if unit is None and not (found and found[0][0] < OWN):
@@ -199,21 +201,24 @@ def _turn_of_landmarks(given, canonical):
     """The rotation (3, 3) that takes the landmarks to the reference's directions (Kabsch 1976); None if on a line."""
     names = [n for n in given if n in canonical and np.isfinite(given[n]).all()]
     if len(names) < 3:
-        return None, 0.0
+        return None
     a = np.array([given[n] for n in names], dtype=float)
     b = np.array([canonical[n] for n in names])
     u, s, vt = np.linalg.svd((b - b.mean(axis=0)).T @ (a - a.mean(axis=0)))
     if s[1] < 1e-3 * s[0]:
-        return None, 0.0
-    return u @ np.diag([1, 1, np.sign(np.linalg.det(u @ vt))]) @ vt, s[1] / s[0]
+        return None
+    return u @ np.diag([1, 1, np.sign(np.linalg.det(u @ vt))]) @ vt
 
 
-def _by_landmarks(turn, spread, allowed, name, scale):
+def _by_landmarks(turn, allowed, name, scale, picked):
     rotation = max(allowed, key=lambda r: np.trace(r.T @ turn))
     tilt = np.degrees(np.arccos(np.clip((np.trace(rotation.T @ turn) - 1) / 2, -1, 1)))
     up, front = _names(rotation)
     certain = bool(tilt < 35)
-    reason = f"Read as {unit_words(name, scale)}, {up} up, face toward {front}: the landmarks say so"
-    if not certain:
-        reason += f", but the head is turned by {tilt:.0f} degrees from these axes: check them"
+    reason = f"Read as {unit_words(name, scale)}, {up} up, face toward {front}"
+    marks = "the landmarks" if picked else "the landmarks that were found"
+    if certain:
+        reason += f": {marks} say so"
+    else:
+        reason += f", but by {marks} the head is turned by {tilt:.0f} degrees from these axes: check them"
     return Orientation(name, scale, up, front, rotation, certain, reason + ".")

@@ -18,6 +18,7 @@ UNITS = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
 #: Largest extent of a scan of a face patch (the smallest) and of a bust (the largest), mm.
 PLAUSIBLE = (90.0, 900.0)
 BODY = 2600.0  # mm, the same of somebody from head to foot: taken for that only if no unit makes a head of it
+POSSIBLE = (10.0, 1e5)  # mm, the same of whatever may hold a head, where somebody tells the unit
 
 #: What a unit is called that the size of the face tells, because no usual one makes it a person's.
 BY_FACE = "face"
@@ -53,16 +54,27 @@ def plausible_units(mesh: Mesh, unit: str | float | None = None) -> dict[str, fl
 
     Raises
     ------
-    InputError : ``unit`` is not understood.
+    InputError : ``unit`` is not understood, or makes the scan something that no head can be in.
     """
     return dict(units_of(surface_samples(mesh), unit))
 
 
 def units_of(points: np.ndarray, unit, called: str = CUSTOM) -> list[tuple[str, float]]:
-    """(name, mm) of `plausible_units` for samples (n, 3) of a scan; ``called`` : the name of one that is given as a number."""
-    if unit is not None:
-        return [told_unit(unit, called)]
+    """(name, mm) of `plausible_units` for samples (n, 3) of a scan; ``called`` : the name of one that is given as a number.
+
+    Raises
+    ------
+    InputError : ``unit`` is not understood, or makes the scan something that no head can be in.
+    """
     extent = np.ptp(points, axis=0).max()
+    if unit is not None:
+        name, scale = told_unit(unit, called)
+        if not POSSIBLE[0] < extent * scale < POSSIBLE[1]:
+            raise InputError(
+                f"In {unit_words(name, scale)} the scan is {extent * scale:.3g} mm across, which is no head: give another "
+                "unit, or none to have it detected."
+            )
+        return [(name, scale)]
     least, most = PLAUSIBLE
     units = [(name, scale) for name, scale in UNITS.items() if least <= extent * scale <= most]
     return units or [(name, scale) for name, scale in UNITS.items() if most < extent * scale <= BODY]
