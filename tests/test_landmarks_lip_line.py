@@ -9,7 +9,17 @@ import pytest
 from headshop.sim.adapt.closest import Surface
 from headshop.sim.landmarks.expression import told_of_lips
 from headshop.sim.landmarks.find import find_landmarks
-from headshop.sim.landmarks.lip_line import PLAIN, LipLine, line_ends, lip_line, missing_run
+from headshop.sim.landmarks.lip_line import (
+    ASIDE,
+    FADING,
+    PLAIN,
+    WIDE,
+    LipLine,
+    fading_ends,
+    line_ends,
+    lip_line,
+    missing_run,
+)
 from headshop.sim.landmarks.picked import moved
 from headshop.sim.landmarks.pose_search import Pose
 from headshop.sim.landmarks.shape_fit import CHANGE, fit_shape
@@ -131,6 +141,24 @@ def test_neither_a_weak_place_nor_a_speck_beyond_ends_a_line():
     worth[60:66] = PLAIN - 0.5
     worth[90:92] = PLAIN + 0.4
     assert line_ends(worth) == (80, 20)
+
+
+def test_a_line_that_fades_goes_on_to_the_corner_of_the_shape_and_no_farther():
+    """As between lips that a phone fused in voxels of two millimetres: it is plain in the middle only."""
+    aside = np.arange(-WIDE, WIDE + ASIDE / 2, ASIDE)
+    fading = np.interp(np.abs(aside), [0, 14, 16, 30, 34], [1.2, 1.2, PLAIN - 0.05, FADING + 0.1, 0.0])
+    assert 14 < aside[line_ends(fading)[0]] < 16.5
+    ends = aside[fading_ends(fading, aside, [25.0, 20.0])]
+    np.testing.assert_allclose(ends, [25.0, -20.0])
+    far = aside[fading_ends(fading, aside, [40.0, 40.0])]
+    np.testing.assert_allclose(np.abs(far), 31.0, atol=ASIDE)
+    short = aside[fading_ends(fading, aside, [5.0, 5.0])]
+    np.testing.assert_array_equal(short, aside[list(line_ends(fading))])
+
+
+def test_a_line_that_ends_at_the_rim_of_what_is_looked_at_goes_on_no_farther():
+    aside = np.arange(-WIDE, WIDE + ASIDE / 2, ASIDE)
+    assert fading_ends(np.full(len(aside), 1.2), aside, [60.0, 60.0]) == [len(aside) - 1, 0]
 
 
 def test_the_skin_follows_the_line(reference):
