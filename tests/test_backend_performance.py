@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from headshop.sim.acting.principal import principal_shapes
+from headshop.sim.mesh_subdivision import drawn
 from headshop.sim.progress import finish
 
 FRAMES = np.arange(1, 13)
@@ -65,6 +66,44 @@ def test_it_plays_what_was_simulated(bpy, skin, performance, motion, reference):
             np.testing.assert_allclose(played(bpy, heads.parts_of(skin)[part], frame), wanted, atol=0.002)
     action = bpy.data.actions["Fran Performance"]
     assert [slot.target_id_type for slot in action.slots] == ["KEY", "KEY"]
+
+
+def exported(skin, folder):
+    """Shapes and performance as an export folder holds them."""
+    from headshop.headshop_addon.plain_export import write_plain
+
+    write_plain(skin, folder)
+    with np.load(folder / "shapes.npz") as shapes, np.load(folder / "performance.npz") as acting:
+        return dict(shapes), dict(acting)
+
+
+def test_plain_files_hold_every_frame(bpy, skin, performance, motion, reference, tmp_path):
+    from headshop.headshop_addon import shape_keys
+
+    pose = {"joy": {"skin": np.ones_like(reference.skin.vertices)}}
+    write(performance, skin, motion)
+    shape_keys.write_shapes(skin, pose, {"joy": {"peak_mm": 1.0}})
+    bpy.context.scene.render.fps, bpy.context.scene.render.fps_base = 30, 1.001
+    shapes, acting = exported(skin, tmp_path)
+    assert acting["names"].tolist() == shapes["names"].tolist() == ["joy", *(f"Performance_{k:02d}" for k in (1, 2, 3))]
+    assert acting["fps"] == pytest.approx(30 / 1.001) and acting["frames"].tolist() == FRAMES.tolist()
+    assert acting["weights"].shape == (12, 4) and not acting["weights"][:, 0].any()
+    frames = shapes["basis"] + np.tensordot(acting["weights"], shapes["deltas"], 1)
+    for frame, found in zip(acting["frames"], frames, strict=True):
+        wanted = drawn(reference.skin.faces, played(bpy, skin, int(frame)))
+        np.testing.assert_allclose(found, wanted, atol=0.002)
+
+
+def test_plain_files_hold_it_beside_the_artists_own_animation(bpy, skin, performance, motion, tmp_path):
+    from headshop.headshop_addon import bridge
+
+    bridge.ensure_shape_key(skin, "sculpted").keyframe_insert("value", frame=1)
+    write(performance, skin, motion)
+    shapes, acting = exported(skin, tmp_path)
+    assert acting["names"].tolist() == [f"Performance_{k:02d}" for k in (1, 2, 3)]
+    assert np.abs(acting["weights"]).max(axis=0) == pytest.approx(1)
+    performance.remove_performance(skin)
+    assert performance.baked_weights(skin) is None
 
 
 def test_baking_again_replaces_it(bpy, skin, performance, motion):
