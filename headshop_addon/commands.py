@@ -111,11 +111,11 @@ def bake(options) -> None:
         skin = open_head(options.head, options.name)
         from . import baking
 
-        report = _run(baking.bake(skin, options.poses, performance, options.model, options.dynamic), options)
+        made = _run(baking.bake(skin, options.poses, performance, options.model, options.dynamic), options)
         save(blend)
         _write_plain(skin, plain, outputs)
     if not options.quiet:
-        print(f"{output}: {baking.summary(report)}")
+        print(f"{output}: {baking.summary(made)}")
 
 
 def render(options) -> None:

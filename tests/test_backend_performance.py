@@ -175,6 +175,25 @@ def test_a_simulated_performance_plays_without_the_extension(
     assert skin_moved == pytest.approx(report["peak_mm"], abs=0.01) and jaw_moved > 3
 
 
+def test_a_bake_says_what_it_baked_itself(bpy, skin, monkeypatch):
+    from headshop.headshop_addon import baking, heads
+    from headshop.sim.acting import expressions
+    from headshop.sim.acting.performance import Performance
+
+    table = expressions.expressions()
+
+    def bake(*names, **wanted):
+        monkeypatch.setattr(expressions, "expressions", lambda: {name: table[name] for name in names})
+        return baking.summary(finish(baking.bake(skin, model="waters", **wanted)))
+
+    assert bake("smile", "frown", pose_set="expressions").startswith("2 shapes (")
+    assert bake("blink", pose_set="expressions").startswith("1 shapes (")
+    acted = Performance({"jaw_open": ((0.0, 0.0), (1.0, 0.2))}, 2.0)
+    assert bake(acted=acted) == "3 frames in 2 shape keys of the skin"
+    report = heads.read_report(skin)
+    assert report["shapes"].keys() == {"smile", "frown", "blink"} and report["performance"]["frames"] == 3
+
+
 _PLAYER = """
 import sys, bpy, numpy as np
 bpy.ops.wm.open_mainfile(filepath=sys.argv[1])
