@@ -89,7 +89,7 @@ def bake_acted(
     )
     motion = outer.head_motion(acted)
     head_place.write_motion(skin, motion, 1 + np.arange(len(poses)), f"{heads.head_name(skin)} Head Motion")
-    scene.render.fps, scene.render.fps_base = round(acted.fps), round(acted.fps) / acted.fps
+    head_place.set_frame_rate(scene, acted.fps)
     scene.frame_start, scene.frame_end = 1, max(len(poses), 1)
     return report
 

@@ -106,6 +106,14 @@ def test_plain_files_hold_it_beside_the_artists_own_animation(bpy, skin, perform
     assert performance.baked_weights(skin) is None
 
 
+@pytest.mark.parametrize("fps", [0.01, 0.4, 0.5, 23.976, 1000])
+def test_a_scene_plays_as_fast_as_the_performance(bpy, fps):
+    from headshop.headshop_addon.head_place import frame_rate, set_frame_rate
+
+    set_frame_rate(bpy.context.scene, fps)
+    assert frame_rate(bpy.context.scene) == pytest.approx(fps)
+
+
 def test_baking_again_replaces_it(bpy, skin, performance, motion):
     from headshop.headshop_addon import bridge
 
@@ -192,6 +200,15 @@ def test_a_bake_says_what_it_baked_itself(bpy, skin, monkeypatch):
     assert bake(acted=acted) == "3 frames in 2 shape keys of the skin"
     report = heads.read_report(skin)
     assert report["shapes"].keys() == {"smile", "frown", "blink"} and report["performance"]["frames"] == 3
+
+
+def test_a_slow_performance_bakes_at_its_own_rate(bpy, skin):
+    from headshop.headshop_addon import baking, head_place
+    from headshop.sim.acting.performance import Performance
+
+    acted = Performance({"jaw_open": ((0.0, 0.0), (5.0, 0.2))}, 0.4)
+    finish(baking.bake(skin, acted=acted, model="waters"))
+    assert head_place.frame_rate(bpy.context.scene) == pytest.approx(0.4) and bpy.context.scene.frame_end == 3
 
 
 _PLAYER = """
