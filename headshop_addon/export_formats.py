@@ -4,9 +4,11 @@
 from pathlib import Path
 
 import bpy
+import numpy as np
 
 from ..sim.errors import InputError
 from .engine_files import KINDS, textures_folder
+from .shader_nodes import socket
 
 
 def write_scene(path: Path, copies, animated: bool) -> None:
@@ -18,14 +20,16 @@ def write_scene(path: Path, copies, animated: bool) -> None:
     ------
     InputError : the exporter is an add-on that is switched off.
     """
-    kind = path.suffix.lower()
-    # USD's exporter leaves out pictures that only the .blend holds
-    folder = path.parent / (textures_folder(path) or "textures")
-    unpacked = _unpack(folder, copies) if kind in (".usdc", ".usdz") else ()
+    kind, made = path.suffix.lower(), []
     try:
+        if kind in (".usdc", ".usdz"):
+            worn = dict.fromkeys(slot for obj in copies for slot in obj.data.materials if slot is not None)
+            made += _paint_opacity(worn)
+            # USD's exporter leaves out pictures that only the .blend holds
+            made += _unpack(path.parent / (textures_folder(path) or "textures"), worn)
         _WRITERS[kind](str(path), animated)
     finally:
-        bpy.data.batch_remove(unpacked)
+        bpy.data.batch_remove(made)
 
 
 def _glb(path: str, animated: bool) -> None:
@@ -80,11 +84,29 @@ def _usd(path: str, animated: bool) -> None:
 _WRITERS = dict(zip(KINDS, (_glb, _fbx, _usd, _usd), strict=True))
 
 
-def _unpack(folder: Path, copies) -> list[bpy.types.Image]:
-    """Let the copies' materials show files in ``folder`` in place of what they show; returns the images that do."""
+def _paint_opacity(materials) -> list[bpy.types.Image]:
+    """Give what is clear its opacity as a picture, and return those: from Blender 5.2 on USD gets no number from it."""
+    painted = []
+    for material in materials:
+        tree = material.node_tree
+        for shader in [node for node in tree.nodes if node.type == "BSDF_PRINCIPLED"] if tree is not None else ():
+            alpha = socket(shader.inputs, "Alpha")
+            if not alpha.is_linked and alpha.default_value < 1:
+                image = bpy.data.images.new(f"{material.name} Opacity", 4, 4, alpha=True)
+                painted.append(image)
+                image.pixels.foreach_set(np.tile(np.float32([0, 0, 0, alpha.default_value]), 16))
+                image.pack()
+                node = tree.nodes.new("ShaderNodeTexImage")
+                node.image = image
+                tree.links.new(socket(node.outputs, "Alpha"), alpha)
+    return painted
+
+
+def _unpack(folder: Path, materials) -> list[bpy.types.Image]:
+    """Let the materials show files in ``folder`` in place of what they show; returns the images that do."""
     folder.mkdir()
     shown = {}
-    for material in {slot for obj in copies for slot in obj.data.materials if slot is not None}:
+    for material in materials:
         for node in material.node_tree.nodes if material.node_tree is not None else ():
             if node.type == "TEX_IMAGE" and node.image is not None:
                 if node.image not in shown:

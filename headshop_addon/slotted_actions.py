@@ -86,7 +86,7 @@ def keyed_by_us(owner: bpy.types.ID) -> dict[str, tuple[np.ndarray, np.ndarray]]
     played += [(strip.action, strip.action_slot) for track in data.nla_tracks for strip in track.strips]
     found = {}
     for action, slot in played:
-        if action is not None and action.get(OURS):
+        if action is not None and slot is not None and action.get(OURS):
             for curve in action.layers[0].strips[0].channelbag(slot).fcurves:
                 points = np.empty(2 * len(curve.keyframe_points), dtype=np.float32)
                 curve.keyframe_points.foreach_get("co", points)

@@ -75,8 +75,9 @@ def test_what_an_engine_reads_looks_like_the_head(bpy, skin, tmp_path, kind):
     shaders = read_again(bpy, export(skin, tmp_path / f"fran.{kind}"))
     assert shaders.keys() == {"Caruncle", "Cornea", "Enamel", "Gum", "Iris", "Pupil", "Sclera", "Skin Fran", "Tongue"}
     for shader in shaders.values():
-        found = {name: shader.inputs[name] for name in ("Metallic", "Coat Weight", "Transmission Weight")}
-        assert not any(entry.is_linked or entry.default_value for entry in found.values())
+        assert not any(
+            shader.inputs[n].is_linked or shader.inputs[n].default_value for n in ("Metallic", "Coat Weight")
+        )
         assert not shader.inputs["Specular IOR Level"].is_linked
     face = colour(shaders["Skin Fran"])
     middle = face[len(face) // 2, face.shape[1] // 2]
@@ -90,7 +91,13 @@ def test_what_an_engine_reads_looks_like_the_head(bpy, skin, tmp_path, kind):
     iris, white = eye[size // 2, size // 2 + size // 8, :3], eye[size // 2, size // 2 + size // 4, :3]
     assert iris.max() < 0.55 < white.min()
     assert colour(shaders["Pupil"])[:3].max() < 0.01
-    assert 0 < shaders["Cornea"].inputs["Alpha"].default_value < 0.2
+    film = shaders["Cornea"].inputs["Alpha"]
+    clear = pixels(film.links[0].from_node.image)[..., 3] if film.is_linked else np.array(film.default_value)
+    assert 0 < clear.min() and clear.max() < 0.2 and not shaders["Cornea"].inputs["Transmission Weight"].default_value
+    others = [shader for name, shader in shaders.items() if name != "Cornea"]
+    assert all(
+        s.inputs["Alpha"].default_value == 1 and not s.inputs["Transmission Weight"].default_value for s in others
+    )
     assert colour(shaders["Enamel"])[:3].min() > 0.5
     for wet in ("Gum", "Tongue", "Caruncle"):
         assert colour(shaders[wet])[0] > 1.5 * colour(shaders[wet])[1:3].max()
@@ -135,8 +142,8 @@ def test_the_head_is_the_same_after_an_export(bpy, skin, tmp_path, kind):
     export(skin, tmp_path / f"fran.{kind}")
     assert looks() == before
     files = {path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("*")}
-    pictures = {"Fran_Skin_Colour.png", "Fran_Eye_Left_Colour.png", "Fran_Normal.png"} if kind == "usdc" else set()
-    beside = {"fran_textures", *(f"fran_textures/{name}" for name in pictures)} if pictures else set()
+    pictures = ("Fran_Skin_Colour", "Fran_Eye_Left_Colour", "Fran_Normal", "Head_Shop_Cornea_Opacity")
+    beside = {"fran_textures", *(f"fran_textures/{name}.png" for name in pictures)} if kind == "usdc" else set()
     assert files == {f"fran.{kind}", *beside}
 
 
