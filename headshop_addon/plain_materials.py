@@ -46,14 +46,14 @@ def plain_materials(skin: bpy.types.Object, scene: bpy.types.Scene, copies: dict
         for part, obj in copies.items():
             varying = [index for index, material in enumerate(worn[obj]) if _varies(material)]
             uv_map, picture = _uv_map(obj), None
+            detail = images_of(skin) if part == "skin" else None
             if varying and uv_map is not None:
                 # both eyes wear the same materials, and so the same picture
                 kind = tuple(worn[obj][index] for index in varying)
                 if kind not in pictures:
-                    size = _size(kind) if part == "skin" else EYE_SIZE
+                    size = _size(kind, detail or ()) if part == "skin" else EYE_SIZE
                     pictures[kind] = bake_colour(scene, obj, uv_map, varying, f"{obj.name} Colour", size)
                 picture = pictures[kind]
-            detail = images_of(skin) if part == "skin" else None
             for index, material in enumerate(worn[obj]):
                 if material is not None:
                     key = material, picture if index in varying else None
@@ -92,10 +92,11 @@ def _uv_map(obj: bpy.types.Object) -> str | None:
     return UV_MAP
 
 
-def _size(materials) -> int:
-    """Pixels enough for the largest picture in the materials."""
-    nodes = [node for material in materials for node in material.node_tree.nodes]
-    return max([SKIN_SIZE, *(max(node.image.size) for node in nodes if node.type == "TEX_IMAGE" and node.image)])
+def _size(materials, detail) -> int:
+    """Pixels enough for the largest picture in the materials, those of the ``detail`` left out."""
+    nodes = [node for material in materials for node in material.node_tree.nodes if node.type == "TEX_IMAGE"]
+    pictures = [node.image for node in nodes if node.image is not None and node.image not in detail]
+    return max([SKIN_SIZE, *(max(picture.size) for picture in pictures)])
 
 
 def _plain(
