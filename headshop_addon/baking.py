@@ -41,34 +41,34 @@ def bake(
 
     dynamics : whether the tissue swings in the performance, or rests in every frame
 
-    Returns the head's whole report. A performance sets the scene's frame rate and range to its own.
+    Returns what this bake made, in the form of the head's report, which holds that of earlier bakes as well: ``rig``,
+    ``shapes`` and ``performance``, those that there are. A performance sets the scene's frame rate and range to its own.
     """
     report = heads.read_report(skin)
     seconds = dict(report.get("seconds", {}))
     border = 1.0 if acted is None else 0.5
-    shapes = acting = None
+    made = {}
     if pose_set == RIG:
         from .response import require_own_model
 
         require_own_model(model)
         with timed(seconds, "bake_rig"):
-            report["rig"] = yield from portion(rig_keys.bake_rig(skin), 0.0, border)
+            made["rig"] = yield from portion(rig_keys.bake_rig(skin), 0.0, border)
     elif pose_set is not None:
         with timed(seconds, f"bake_{pose_set}"):
             poses, over = poses_of_set(skin, pose_set)
-            shapes = yield from portion(shape_keys.bake_poses(skin, poses, model, over), 0.0, border)
+            made["shapes"] = yield from portion(shape_keys.bake_poses(skin, poses, model, over), 0.0, border)
     if acted is not None:
         with timed(seconds, "bake_performance"):
             work = bake_acted(skin, acted, None, model, dynamics)
-            acting = yield from portion(work, 0.0 if pose_set is None else border, 1.0)
-    if shapes is not None:
+            made["performance"] = yield from portion(work, 0.0 if pose_set is None else border, 1.0)
+    report |= made
+    if "shapes" in made:
         report["shapes"] = {name: row for name, row in shape_keys.baked_report(skin).items() if "converged" in row}
-    if acting is not None:
-        report["performance"] = acting
     report["seconds"] = seconds
     report["versions"] = versions()
     heads.write_report(skin, report)
-    return report
+    return made
 
 
 def bake_acted(
@@ -89,7 +89,7 @@ def bake_acted(
     )
     motion = outer.head_motion(acted)
     head_place.write_motion(skin, motion, 1 + np.arange(len(poses)), f"{heads.head_name(skin)} Head Motion")
-    scene.render.fps, scene.render.fps_base = round(acted.fps), round(acted.fps) / acted.fps
+    head_place.set_frame_rate(scene, acted.fps)
     scene.frame_start, scene.frame_end = 1, max(len(poses), 1)
     return report
 
@@ -119,17 +119,17 @@ def remove_baked(skin: bpy.types.Object) -> None:
         settings.live = True
 
 
-def summary(report: dict) -> str:
-    """A sentence of what was baked."""
+def summary(made: dict) -> str:
+    """A sentence of what `bake` made."""
     said = []
-    if report.get("rig"):
-        rig = report["rig"]
+    if made.get("rig"):
+        rig = made["rig"]
         said.append(f"a rig of {rig['sliders']} sliders and {rig['driven']} driven shape keys")
-    if report.get("shapes"):
-        worst = max(shape["penetration_mm"] for shape in report["shapes"].values())
-        settled = sum(shape["converged"] for shape in report["shapes"].values())
-        said.append(f"{len(report['shapes'])} shapes ({settled} at rest, deepest penetration {worst:.2f} mm)")
-    if report.get("performance"):
-        acting = report["performance"]
+    if made.get("shapes"):
+        worst = max(shape["penetration_mm"] for shape in made["shapes"].values())
+        settled = sum(shape["converged"] for shape in made["shapes"].values())
+        said.append(f"{len(made['shapes'])} shapes ({settled} at rest, deepest penetration {worst:.2f} mm)")
+    if made.get("performance"):
+        acting = made["performance"]
         said.append(f"{acting['frames']} frames in {acting['keys'].get('skin', 0)} shape keys of the skin")
     return ", ".join(said)

@@ -184,6 +184,26 @@ def read_attribute(data: bpy.types.Mesh, name: str) -> np.ndarray | None:
     return None if dtype is None else _get(attribute.data, "value", 1, dtype)
 
 
+def read_vectors(data: bpy.types.Mesh, name: str) -> np.ndarray | None:
+    """A per-vertex attribute (n, 3) of vectors or None."""
+    attribute = data.attributes.get(name)
+    if attribute is None or (attribute.data_type, attribute.domain) != ("FLOAT_VECTOR", "POINT"):
+        return None
+    return _get(attribute.data, "vector", 3)
+
+
+def remove_attributes(data: bpy.types.Mesh, start: str) -> None:
+    """Take away the attributes whose names begin with ``start``."""
+    for name in [attribute.name for attribute in data.attributes if attribute.name.startswith(start)]:
+        data.attributes.remove(data.attributes[name])
+
+
+def add_uv(data: bpy.types.Mesh, name: str, uv: np.ndarray) -> None:
+    """Add a UV map on which every vertex has one place (n, 2)."""
+    corner_vertex = _get(data.loops, "vertex_index", 1, np.int32)
+    _set(data.uv_layers.new(name=name).uv, "vector", uv[corner_vertex])
+
+
 def write_colour(data: bpy.types.Mesh, colour: np.ndarray, name: str = "Color") -> None:
     """Set a per-vertex colour attribute from sRGB (n, 3) or (n, 4) values 0..1."""
     attribute = data.color_attributes.get(name) or data.color_attributes.new(name, "FLOAT_COLOR", "POINT")

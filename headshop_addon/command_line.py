@@ -92,7 +92,7 @@ def parser() -> argparse.ArgumentParser:
     render.add_argument("-o", "--output", required=True, metavar="SHEET.png|MOVIE.mp4")
 
     export = command("export", "Write an engine-ready copy: no modifiers, exact names.", chosen)
-    export.add_argument("-o", "--output", required=True, metavar="FILE.glb|fbx|usdc")
+    export.add_argument("-o", "--output", required=True, metavar="FILE.glb|fbx|usdc|usdz")
 
     sample = command("sample", "Write the embedded sample subject: scan, landmarks, truth.")
     sample.add_argument("--seed", type=_seed, default=None, help="another individual: a whole number from 0 up")

@@ -8,12 +8,13 @@ from pathlib import Path
 
 from ..sim.errors import InputError
 from ..sim.progress import finish
+from .engine_files import KINDS, textures_folder
 from .headless import open_head, save, set_up_view, start_blender, wake_cycles
 from .outputs import Outputs
 from .progress_bar import progress_bar
 
 #: File extensions each command writes.
-_BLEND, _PICTURES, _ENGINES, _LANDMARKS = (".blend",), (".png", ".mp4"), (".glb", ".fbx", ".usdc"), (".json",)
+_BLEND, _PICTURES, _LANDMARKS = (".blend",), (".png", ".mp4"), (".json",)
 
 
 def version() -> None:
@@ -108,11 +109,11 @@ def bake(options) -> None:
         skin = open_head(options.head, options.name)
         from . import baking
 
-        report = _run(baking.bake(skin, options.poses, performance, options.model, options.dynamic), options)
+        made = _run(baking.bake(skin, options.poses, performance, options.model, options.dynamic), options)
         save(blend)
         _write_plain(skin, plain, outputs)
     if not options.quiet:
-        print(f"{output}: {baking.summary(report)}")
+        print(f"{output}: {baking.summary(made)}")
 
 
 def render(options) -> None:
@@ -146,9 +147,9 @@ def render(options) -> None:
 def export(options) -> None:
     """An engine-ready copy."""
     _require_head_file(options.head)
-    _require_kind(options.output, _ENGINES)
+    _require_kind(options.output, KINDS)
     with Outputs() as outputs:
-        copy = outputs.file(options.output)
+        copy = outputs.file(options.output, textures_folder(options.output))
         skin = open_head(options.head, options.name)
         from .export import export_head
 

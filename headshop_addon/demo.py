@@ -66,8 +66,8 @@ def run(folder: Path, seed: int | None = None) -> None:
         fit, anatomy = report["fit"], report["anatomy"]
         say(f"head with {anatomy['muscles']} muscles, {fit['mean_mm']:.2f} mm from the scan on average")
     with _step("act") as say:
-        report = _finish(baking.bake(skin, "expressions", sample_performance("smile")))
-        say(baking.summary(report))
+        made = _finish(baking.bake(skin, "expressions", sample_performance("smile")))
+        say(baking.summary(made))
     with _step("save") as say:
         _save(folder / "head.blend")
         say(f"{folder / 'head.blend'}")

@@ -11,7 +11,10 @@ import bpy
 
 from ..sim.errors import InputError
 from . import heads, shape_keys
+from .engine_files import KINDS, textures_folder
+from .export_formats import write_scene
 from .outputs import Outputs
+from .plain_materials import plain_materials
 from .quiet import quiet
 
 #: What an engine gets: all that is seen. Bones and muscles stay behind.
@@ -20,73 +23,28 @@ PARTS = ("skin", "eye_l", "eye_r", "teeth_upper", "teeth_lower", "tongue")
 _LIVE = "Live"
 
 
-def _glb(path: str, animated: bool) -> None:
-    if not hasattr(bpy.types, "EXPORT_SCENE_OT_gltf"):
-        raise InputError("Blender's glTF add-on is off: switch it on in Preferences, Add-ons.")
-    bpy.ops.export_scene.gltf(
-        filepath=path,
-        export_format="GLB",
-        use_active_scene=True,
-        export_apply=False,
-        export_morph=True,
-        export_morph_normal=True,
-        export_animations=animated,
-        export_animation_mode="SCENE",
-        export_cameras=False,
-        export_lights=False,
-    )
-
-
-def _fbx(path: str, animated: bool) -> None:
-    bpy.ops.export_scene.fbx(
-        filepath=path,
-        object_types={"MESH"},
-        use_mesh_modifiers=False,
-        mesh_smooth_type="OFF",
-        bake_anim=animated,
-        bake_anim_use_all_actions=False,
-        bake_anim_use_nla_strips=False,
-        bake_anim_simplify_factor=0.0,
-    )
-
-
-def _usdc(path: str, animated: bool) -> None:
-    bpy.ops.wm.usd_export(
-        filepath=path,
-        export_animation=animated,
-        export_shapekeys=True,
-        export_armatures=False,
-        export_lights=False,
-        export_cameras=False,
-        convert_world_material=False,
-        export_custom_properties=False,
-    )
-
-
-_EXPORTERS = {".glb": _glb, ".fbx": _fbx, ".usdc": _usdc}
-EXTENSIONS = tuple(_EXPORTERS)
-
-
 def export_head(skin: bpy.types.Object, path) -> list[str]:
     """Write the head's visible parts with all their shape keys; returns the names of the skin's.
 
-    The file appears whole or not at all. A baked performance goes along as animation of the shape keys.
+    The file appears whole or not at all, with the folder of its pictures if it is of a kind that needs one
+    (`engine_files.textures_folder`). A baked performance goes along as animation of the shape keys.
 
     Raises
     ------
-    InputError : not a whole head, an unknown extension, or the file cannot be written there.
+    InputError : not a whole head, an unknown extension, the file cannot be written there, or an add-on of Blender's that
+        it takes is switched off.
     """
     path = Path(path)
-    if path.suffix.lower() not in _EXPORTERS:
-        raise InputError(f"{path.name} must end in {', '.join(_EXPORTERS)}: rename it.")
+    if path.suffix.lower() not in KINDS:
+        raise InputError(f"{path.name} must end in {', '.join(KINDS)}: rename it.")
     heads.read_head(skin)
-    with Outputs() as outputs, _copies(skin) as copies:
+    with Outputs() as outputs, _copies(skin) as (scene, copies):
+        temporary = outputs.file(path, textures_folder(path))
         keys = copies["skin"].data.shape_keys
         animated = any(c.data.shape_keys and _action_of(c.data.shape_keys) for c in copies.values())
-        temporary = outputs.file(path)
-        with quiet() as printed:
+        with plain_materials(skin, scene, copies), quiet() as printed:
             try:
-                _EXPORTERS[path.suffix.lower()](str(temporary.resolve()), animated)
+                write_scene(temporary.resolve(), copies.values(), animated)
             except RuntimeError as error:
                 raise RuntimeError(f"{error} {printed()}") from error
         if not temporary.is_file():
@@ -100,7 +58,7 @@ def _action_of(keys):
 
 @contextmanager
 def _copies(skin: bpy.types.Object):
-    """Part -> a copy of its object, alone in a scene that is the context's; the copies bear the originals' names."""
+    """A scene that is the context's, and part -> a copy of its object, alone in it; they bear the originals' names."""
     original = bpy.context.scene
     scene = bpy.data.scenes.new("Head Shop export")
     scene.render.fps, scene.render.fps_base = original.render.fps, original.render.fps_base
@@ -117,7 +75,7 @@ def _copies(skin: bpy.types.Object):
             obj.matrix_world = skin.matrix_world @ _matrix(heads.placement(skin, heads.parts_of(skin)[part]))
         with bpy.context.temp_override(scene=scene, view_layer=scene.view_layers[0], collection=scene.collection):
             scene.view_layers[0].update()
-            yield copies
+            yield scene, copies
     finally:
         for obj in copies.values():
             bpy.data.meshes.remove(obj.data)  # takes the object along

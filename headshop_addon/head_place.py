@@ -35,6 +35,12 @@ def frame_rate(scene: bpy.types.Scene) -> float:
     return scene.render.fps / scene.render.fps_base
 
 
+def set_frame_rate(scene: bpy.types.Scene, fps: float) -> None:
+    """Let the scene play ``fps`` frames a second, which Blender holds as a whole number over a base."""
+    whole = max(round(fps), 1)
+    scene.render.fps, scene.render.fps_base = whole, whole / fps
+
+
 def felt_in(skin: bpy.types.Object, scene: bpy.types.Scene, frames):
     """Function of the skin's points (n, 3) mm at rest: what acts on them from outside at each of ``frames``.
 

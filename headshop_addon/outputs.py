@@ -17,6 +17,7 @@ class Outputs:
 
     def __init__(self):
         self._renames: list[tuple[Path, Path]] = []
+        self._folders: list[tuple[Path, Path]] = []
         self._scratch: list[Path] = []
         self._made: list[Path] = []
 
@@ -26,6 +27,8 @@ class Outputs:
     def __exit__(self, kind, error, trace):
         try:
             if kind is None:
+                for temporary, final in self._folders:
+                    self._fill(temporary, final)
                 for temporary, final in self._renames:
                     if temporary.exists():
                         os.replace(temporary, final)
@@ -42,8 +45,11 @@ class Outputs:
                     pass  # somebody else put something there meanwhile
         return False
 
-    def file(self, path) -> Path:
+    def file(self, path, beside: str | None = None) -> Path:
         """A path to write to instead of ``path``, which it becomes in the end: same name, in a hidden folder beside it.
+
+        ``beside`` is the name of a folder that may be made next to it. What is in it goes into the folder of that name
+        next to ``path``, before ``path`` appears, and replaces files of the same names; others there stay.
 
         Raises
         ------
@@ -55,6 +61,13 @@ class Outputs:
         scratch = self._scratch_beside(path)
         if path.exists() and not os.access(path, os.W_OK):
             raise InputError(f"{path} is write-protected: give another output.")
+        if beside is not None:
+            folder = path.parent / beside
+            if folder.exists() and not (folder.is_dir() and os.access(folder, os.W_OK)):
+                raise InputError(
+                    f"{folder} must be a folder that can be written to, for {path.name}: rename the output."
+                )
+            self._folders.append((scratch / beside, folder))
         self._renames.append((scratch / path.name, path))
         return scratch / path.name
 
@@ -81,6 +94,13 @@ class Outputs:
             raise InputError(f"Nothing can be written to {folder} ({why}): give another output.") from None
         self._scratch.append(scratch)
         return scratch
+
+    def _fill(self, temporary: Path, final: Path):
+        files = sorted(temporary.iterdir()) if temporary.is_dir() else []
+        if files:
+            self._make(final)
+        for file in files:
+            os.replace(file, final / file.name)
 
     def _make(self, folder: Path):
         missing = []

@@ -17,7 +17,7 @@ from ..sim.errors import InputError
 from ..sim.progress import Progress, Work
 from ..sim.tissue.posing import posed_parts
 from . import bridge, head_place, heads, shape_keys
-from .slotted_actions import animate_keys, curves_of, new_action, stop
+from .slotted_actions import animate_keys, curves_of, keyed_by_us, new_action, stop, value_path
 
 PERFORMANCE = "headshop_performance"
 #: mm that the principal shape keys may differ from the simulation, which itself settles to 0.01 mm: asking for more
@@ -142,6 +142,17 @@ def write_performance(skin, found: dict, frames: np.ndarray, name: str) -> None:
     settings = getattr(skin, "headshop", None)
     if settings is not None:
         settings.live = False  # else the sliders would move the face a second time
+
+
+def baked_weights(skin: bpy.types.Object) -> tuple[list[str], np.ndarray, np.ndarray] | None:
+    """The skin's shape keys of a baked performance, its frames (f,) and their weights (f, k); None if there is none."""
+    names = json.loads(skin.get(PERFORMANCE, "[]"))
+    curves = {} if skin.data.shape_keys is None else keyed_by_us(skin.data.shape_keys)
+    keyed = {name: curves.get(value_path(name)) for name in names}
+    names = [name for name, curve in keyed.items() if curve is not None]
+    if not names:
+        return None
+    return names, keyed[names[0]][0], np.stack([keyed[name][1] for name in names], axis=1)
 
 
 def _free_name(obj, name: str) -> str:

@@ -6,11 +6,11 @@ import json
 from ..sim.anatomy.head import Head
 from ..sim.anatomy.storage import write_atomically
 
-#: Everything an export folder may hold; ``shapes.npz`` only once something was baked, the maps
-#: only of a head that has them.
+#: Everything an export folder may hold; ``shapes.npz`` only once something was baked, ``performance.npz`` only once a
+#: performance was, the maps only of a head that has them.
 FILES = (
     *("skin.ply", "skull.ply", "mandible.ply", "landmarks.json", "skull_landmarks.json", "muscles.json"),
-    *("report.json", "shapes.npz", "displacement.png", "normal.png"),
+    *("report.json", "shapes.npz", "performance.npz", "displacement.png", "normal.png"),
 )
 
 

@@ -18,8 +18,13 @@ def new_action(name: str) -> bpy.types.Action:
 
 def animate_keys(action: bpy.types.Action, keys: bpy.types.Key, frames, weights: dict[str, np.ndarray]) -> None:
     """Give ``keys`` a slot of ``action``: shape key name -> values (f,) stand at ``frames`` (f,), linear between."""
-    paths = {(f'key_blocks["{bpy.utils.escape_identifier(name)}"].value', 0): v for name, v in weights.items()}
+    paths = {(value_path(name), 0): v for name, v in weights.items()}
     animate(action, keys, "KEY", frames, paths)
+
+
+def value_path(name: str) -> str:
+    """Data path of a shape key's value."""
+    return f'key_blocks["{bpy.utils.escape_identifier(name)}"].value'
 
 
 def animate(action: bpy.types.Action, owner: bpy.types.ID, kind: str, frames, curves: dict) -> None:
@@ -70,3 +75,20 @@ def curves_of(owner: bpy.types.ID) -> dict[str, bpy.types.FCurve]:
         return {}
     bags = [strip.channelbag(data.action_slot) for layer in data.action.layers for strip in layer.strips]
     return {curve.data_path: curve for bag in bags if bag is not None for curve in bag.fcurves if not curve.mute}
+
+
+def keyed_by_us(owner: bpy.types.ID) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """Data path -> frames (f,) and values (f,) of the keys that `animate` gave a datablock."""
+    data = owner.animation_data
+    if data is None:
+        return {}
+    played = [(data.action, data.action_slot)]
+    played += [(strip.action, strip.action_slot) for track in data.nla_tracks for strip in track.strips]
+    found = {}
+    for action, slot in played:
+        if action is not None and slot is not None and action.get(OURS):
+            for curve in action.layers[0].strips[0].channelbag(slot).fcurves:
+                points = np.empty(2 * len(curve.keyframe_points), dtype=np.float32)
+                curve.keyframe_points.foreach_get("co", points)
+                found[curve.data_path] = points[0::2].astype(float), points[1::2].astype(float)
+    return found

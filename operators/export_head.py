@@ -15,13 +15,14 @@ class HEADSHOP_OT_export_head(Simple, ExportHelper, bpy.types.Operator):
     bl_label = "Export Head"
     bl_options = {"REGISTER"}
 
-    filter_glob: bpy.props.StringProperty(default="*.glb;*.fbx;*.usdc", options={"HIDDEN"})
+    filter_glob: bpy.props.StringProperty(default="*.glb;*.fbx;*.usdc;*.usdz", options={"HIDDEN"})
     kind: bpy.props.EnumProperty(
         name="Format",
         items=(
             (".glb", "glTF", "One binary file"),
             (".fbx", "FBX", "One binary file, for engines that read no glTF"),
-            (".usdc", "USD", "One binary file"),
+            (".usdc", "USD", "A binary file, with its pictures in a folder beside it"),
+            (".usdz", "USD, packed", "One file that holds its pictures"),
         ),
     )
 

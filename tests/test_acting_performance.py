@@ -59,7 +59,10 @@ def test_sample_smile_begins_and_ends_at_rest_and_blinks():
     [
         ([], "format"),
         ({"format": "other"}, "format"),
-        ({"format": FORMAT, "fps": 0, "channels": {"a": [[0, 0]]}}, "fps"),
+        *(
+            ({"format": FORMAT, "fps": fps, "channels": {"a": [[0, 0]]}}, "from 0.01 to 1000")
+            for fps in (0, 1e-7, 1001)
+        ),
         ({"format": FORMAT}, "channels"),
         ({"format": FORMAT, "channels": {"a": [[0, "x"]]}}, "pairs"),
         ({"format": FORMAT, "channels": {"a": [[1, 0], [0, 0]]}}, "rise"),

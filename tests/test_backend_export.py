@@ -75,8 +75,8 @@ def test_plain_files(bpy, skin, tmp_path, reference):
     from headshop.headshop_addon.plain_files import FILES
 
     write_plain(skin, tmp_path)
-    maps = {"displacement.png", "normal.png"}  # this head was not fitted to a scan
-    assert {p.name for p in tmp_path.iterdir()} == set(FILES) - maps
+    absent = {"displacement.png", "normal.png", "performance.npz"}  # it was not fitted to a scan, and does not act
+    assert {p.name for p in tmp_path.iterdir()} == set(FILES) - absent
     on_surface = drawn(reference.skin.faces, reference.skin.vertices)
     for part in ("skull", "mandible"):
         mesh = read_ply(tmp_path / f"{part}.ply")

@@ -21,6 +21,25 @@ def test_all_files_appear_in_the_end(tmp_path):
     ]
 
 
+def test_what_lies_beside_a_file_goes_along_and_spares_what_is_there(tmp_path):
+    (tmp_path / "pictures").mkdir()
+    (tmp_path / "pictures" / "own.png").write_text("somebody's own")
+    for kind in ("first", "second"):
+        with Outputs() as outputs:
+            file = outputs.file(tmp_path / "a.txt", "pictures")
+            file.write_text(kind)
+            (file.parent / "pictures").mkdir()
+            (file.parent / "pictures" / "skin.png").write_text(kind)
+    assert {p.name: p.read_text() for p in tmp_path.rglob("*.*")} == {
+        **{"a.txt": "second", "own.png": "somebody's own", "skin.png": "second"}
+    }
+    with Outputs() as outputs:
+        outputs.file(tmp_path / "b.txt", "b_pictures").write_text("without any")
+    assert not (tmp_path / "b_pictures").exists()
+    with pytest.raises(InputError, match="a.txt must be a folder"), Outputs() as outputs:
+        outputs.file(tmp_path / "c.txt", "a.txt")
+
+
 def test_nothing_is_left_of_an_interruption(tmp_path):
     (tmp_path / "old.txt").write_text("old")
     with pytest.raises(KeyboardInterrupt), Outputs() as outputs:

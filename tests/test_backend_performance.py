@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from headshop.sim.acting.principal import principal_shapes
+from headshop.sim.mesh_subdivision import drawn
 from headshop.sim.progress import finish
 
 FRAMES = np.arange(1, 13)
@@ -65,6 +66,52 @@ def test_it_plays_what_was_simulated(bpy, skin, performance, motion, reference):
             np.testing.assert_allclose(played(bpy, heads.parts_of(skin)[part], frame), wanted, atol=0.002)
     action = bpy.data.actions["Fran Performance"]
     assert [slot.target_id_type for slot in action.slots] == ["KEY", "KEY"]
+
+
+def exported(skin, folder):
+    """Shapes and performance as an export folder holds them."""
+    from headshop.headshop_addon.plain_export import write_plain
+
+    write_plain(skin, folder)
+    with np.load(folder / "shapes.npz") as shapes, np.load(folder / "performance.npz") as acting:
+        return dict(shapes), dict(acting)
+
+
+def test_plain_files_hold_every_frame(bpy, skin, performance, motion, reference, tmp_path):
+    from headshop.headshop_addon import shape_keys
+
+    pose = {"joy": {"skin": np.ones_like(reference.skin.vertices)}}
+    write(performance, skin, motion)
+    shape_keys.write_shapes(skin, pose, {"joy": {"peak_mm": 1.0}})
+    bpy.context.scene.render.fps, bpy.context.scene.render.fps_base = 30, 1.001
+    shapes, acting = exported(skin, tmp_path)
+    assert acting["names"].tolist() == shapes["names"].tolist() == ["joy", *(f"Performance_{k:02d}" for k in (1, 2, 3))]
+    assert acting["fps"] == pytest.approx(30 / 1.001) and acting["frames"].tolist() == FRAMES.tolist()
+    assert acting["weights"].shape == (12, 4) and not acting["weights"][:, 0].any()
+    frames = shapes["basis"] + np.tensordot(acting["weights"], shapes["deltas"], 1)
+    for frame, found in zip(acting["frames"], frames, strict=True):
+        wanted = drawn(reference.skin.faces, played(bpy, skin, int(frame)))
+        np.testing.assert_allclose(found, wanted, atol=0.002)
+
+
+def test_plain_files_hold_it_beside_the_artists_own_animation(bpy, skin, performance, motion, tmp_path):
+    from headshop.headshop_addon import bridge
+
+    bridge.ensure_shape_key(skin, "sculpted").keyframe_insert("value", frame=1)
+    write(performance, skin, motion)
+    shapes, acting = exported(skin, tmp_path)
+    assert acting["names"].tolist() == [f"Performance_{k:02d}" for k in (1, 2, 3)]
+    assert np.abs(acting["weights"]).max(axis=0) == pytest.approx(1)
+    performance.remove_performance(skin)
+    assert performance.baked_weights(skin) is None
+
+
+@pytest.mark.parametrize("fps", [0.01, 0.4, 0.5, 23.976, 1000])
+def test_a_scene_plays_as_fast_as_the_performance(bpy, fps):
+    from headshop.headshop_addon.head_place import frame_rate, set_frame_rate
+
+    set_frame_rate(bpy.context.scene, fps)
+    assert frame_rate(bpy.context.scene) == pytest.approx(fps)
 
 
 def test_baking_again_replaces_it(bpy, skin, performance, motion):
@@ -134,6 +181,34 @@ def test_a_simulated_performance_plays_without_the_extension(
     done = subprocess.run([sys.executable, "-c", _PLAYER, str(path)], capture_output=True, text=True, check=True)
     skin_moved, jaw_moved = map(float, done.stdout.split()[-2:])
     assert skin_moved == pytest.approx(report["peak_mm"], abs=0.01) and jaw_moved > 3
+
+
+def test_a_bake_says_what_it_baked_itself(bpy, skin, monkeypatch):
+    from headshop.headshop_addon import baking, heads
+    from headshop.sim.acting import expressions
+    from headshop.sim.acting.performance import Performance
+
+    table = expressions.expressions()
+
+    def bake(*names, **wanted):
+        monkeypatch.setattr(expressions, "expressions", lambda: {name: table[name] for name in names})
+        return baking.summary(finish(baking.bake(skin, model="waters", **wanted)))
+
+    assert bake("smile", "frown", pose_set="expressions").startswith("2 shapes (")
+    assert bake("blink", pose_set="expressions").startswith("1 shapes (")
+    acted = Performance({"jaw_open": ((0.0, 0.0), (1.0, 0.2))}, 2.0)
+    assert bake(acted=acted) == "3 frames in 2 shape keys of the skin"
+    report = heads.read_report(skin)
+    assert report["shapes"].keys() == {"smile", "frown", "blink"} and report["performance"]["frames"] == 3
+
+
+def test_a_slow_performance_bakes_at_its_own_rate(bpy, skin):
+    from headshop.headshop_addon import baking, head_place
+    from headshop.sim.acting.performance import Performance
+
+    acted = Performance({"jaw_open": ((0.0, 0.0), (5.0, 0.2))}, 0.4)
+    finish(baking.bake(skin, acted=acted, model="waters"))
+    assert head_place.frame_rate(bpy.context.scene) == pytest.approx(0.4) and bpy.context.scene.frame_end == 3
 
 
 _PLAYER = """

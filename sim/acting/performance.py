@@ -26,6 +26,7 @@ from .pose import Pose, pose_from
 
 FORMAT = "headshop-performance/1"
 _LONGEST = 36000.0  # seconds; a longer key time is a slip of the unit
+_SLOWEST, _FASTEST = 0.01, 1000.0  # frames a second that Blender's scenes can hold, and more than anybody needs
 
 
 @dataclass(frozen=True)
@@ -115,8 +116,10 @@ def performance_from(document, where: str = "The performance") -> Performance:
     if not isinstance(document, dict) or document.get("format") != FORMAT:
         raise InputError(f'{where} is not a performance: it must say "format": "{FORMAT}".')
     fps = document.get("fps", 24)
-    if not is_number(fps) or not 0 < fps <= 1000:
-        raise InputError(f'{where}: "fps" must be a number of frames per second over 0, not {fps!r}.')
+    if not is_number(fps) or not _SLOWEST <= fps <= _FASTEST:
+        raise InputError(
+            f'{where}: "fps" must be a number of frames per second from {_SLOWEST:g} to {_FASTEST:g}, not {fps!r}.'
+        )
     channels = document.get("channels")
     if not isinstance(channels, dict) or not channels:
         raise InputError(
