@@ -12,6 +12,7 @@ from ..cylindrical.second_opinion import weighed
 from ..mesh import Mesh
 from ..progress import Progress, Work, portion
 from ..scan.depth_jumps import depth_jumps
+from .above_beard import without_beards_lead
 from .confidence import judge, judge_together, like_ears, sure_as_corners
 from .expression import fit_expression, line_of, meeting_lids, outline_of
 from .glasses import fit_without_glasses, glasses_seen
@@ -90,7 +91,9 @@ def _finding(mesh: Mesh, reference: Head | None, unit_scales, any_size: bool) ->
     yield Progress(0.05, LOOKING)
     placing = place_face(mesh, reference, space, unit_scales, any_size)
     scale, fit, target, space = yield from portion(placing, 0.05, 0.75)
-    fit = yield from portion(with_likelier_ears(space, target, fit), 0.75, 0.79)
+    fit = yield from portion(with_likelier_ears(space, target, fit), 0.75, 0.77)
+    if not space.of_infants:
+        fit = yield from portion(without_beards_lead(reference, space, target, fit), 0.77, 0.79)
     fit, telling = yield from run(fit_without_glasses(space, target, fit), 0.79, 0.8, "Looking for glasses")
     target = target.without(glasses_seen(space, telling, target))
     scan = scan.moved(scan.vertices * scale)
