@@ -156,6 +156,12 @@ def test_a_line_that_fades_goes_on_to_the_corner_of_the_shape_and_no_farther():
     np.testing.assert_array_equal(short, aside[list(line_ends(fading))])
 
 
+def test_a_line_that_goes_on_far_beyond_the_corner_of_the_shape_tells_none():
+    """As a furrow in a beard does: one corner 24 mm beyond its place, and the whole face was refused."""
+    assert lip_line(_face(half=40.0), _guess(-4.0), FORWARD) is None
+    assert lip_line(_face(half=30.0), _guess(-4.0), FORWARD).corners.keys() == {"ch_l", "ch_r"}
+
+
 def test_a_line_that_ends_at_the_rim_of_what_is_looked_at_goes_on_no_farther():
     aside = np.arange(-WIDE, WIDE + ASIDE / 2, ASIDE)
     assert fading_ends(np.full(len(aside), 1.2), aside, [60.0, 60.0]) == [len(aside) - 1, 0]

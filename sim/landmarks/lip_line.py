@@ -29,6 +29,7 @@ PLAIN = 0.75
 #: fused in voxels of 1.2 to 3 mm corners were 6.0 mm off without this, 19 at most, and are 2.5 and 4.6; in ten sharper ones .98
 #: and 1.2.
 FADING = 0.35
+ASTRAY = 14.0  # mm beyond the corner of the shape: so far a line goes on along a furrow, of a beard for one, to no corner
 MIDDLE = 10.0  # mm to either side of the middle where it must be as deep
 AROUND = 4  # columns beside a corner that tell how deep it lies, and must not lie in a hole
 #: mm behind where they are taken to meet: what lies deeper between lips is no lip, but mouth that shows through. In the 15
@@ -64,8 +65,11 @@ def lip_line(target: Surface, marks, forward, scale: float = 1.0) -> LipLine | N
     if worth[np.abs(aside) < MIDDLE].mean() < PLAIN:
         return None
     corners = {}
-    ends = fading_ends(worth, aside, [_aside(marks, name, forward, scale) for name in CORNERS])
-    for name, end in zip(CORNERS, ends, strict=True):
+    laid = [_aside(marks, name, forward, scale) for name in CORNERS]
+    ends = fading_ends(worth, aside, laid)
+    for name, end, corner in zip(CORNERS, ends, laid, strict=True):
+        if abs(aside[end]) > corner + ASTRAY:
+            continue
         found = target.closest((places[end] - scale * _behind(depth, end) * forward)[None], NEAR * scale)
         if found.found[0] and not hole[max(end - AROUND, 0) : end + AROUND + 1].any():
             corners[name] = found.points[0]
@@ -132,7 +136,7 @@ def line_ends(worth) -> tuple[int, int]:
 
 def fading_ends(worth, aside, corners) -> list[int]:
     """`line_ends` of a line that is as deep as ``worth`` (k,) mm at ``aside`` (k,) mm of the middle, each followed on while it
-    is `FADING` deep, but no farther than a shape has its corner: ``corners`` mm aside, to the left and to the right."""
+    is `FADING` deep, but no farther than a shape has its corner: ``corners`` mm to the left and to the right."""
     ends = []
     for end, corner in zip(line_ends(worth), corners, strict=True):
         step = 1 if end >= len(worth) // 2 else -1
