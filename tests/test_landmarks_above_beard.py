@@ -31,17 +31,9 @@ def somebody(reference):
         worn = points + (beard * rough)[:, None] * vertex_normals(points, space.triangles)
         worn[:, 2] -= hanging * beard * np.clip((truth["li"][2] - points[:, 2]) / 40, 0, 1)
         target = Surface(worn, space.triangles, smooth=2.0)
-        return target, _whole(fit_shape(space, target, HERE)), truth
+        return target, finish(fit_shape(space, target, HERE)), truth
 
     return make
-
-
-def _whole(work):
-    while True:
-        try:
-            next(work)
-        except StopIteration as end:
-            return end.value
 
 
 def _off(space, fit, truth):

@@ -29,7 +29,9 @@ PLAIN = 0.75
 #: fused in voxels of 1.2 to 3 mm corners were 6.0 mm off without this, 19 at most, and are 2.5 and 4.6; in ten sharper ones .98
 #: and 1.2.
 FADING = 0.35
-ASTRAY = 14.0  # mm beyond the corner of the shape: so far a line goes on along a furrow, of a beard for one, to no corner
+ASTRAY = (
+    14.0  # mm beyond the corner of the shape: so far a line goes on along a furrow, of a beard for one, to no corner
+)
 MIDDLE = 10.0  # mm to either side of the middle where it must be as deep
 AROUND = 4  # columns beside a corner that tell how deep it lies, and must not lie in a hole
 #: mm behind where they are taken to meet: what lies deeper between lips is no lip, but mouth that shows through. In the 15
