@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Scans with pictures on them, as photogrammetry and phones deliver them, in every format that holds any."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from headshop.sim.mesh import Mesh, vertex_normals
-from headshop.sim.scan.texture import has_pictures
+from headshop.sim.scan.texture import has_pictures, vertex_colours
 
 WIDE, HIGH = 64, 32  # of the picture
 
@@ -155,6 +157,26 @@ def test_an_adopted_object_keeps_its_picture(addon, sheet):
     assert has_pictures(mesh) and mesh.colour is not None
 
 
+def test_a_head_is_dressed_in_the_pictures_of_its_scan(bpy, reference, monkeypatch):
+    from headshop.headshop_addon import bridge, heads, materials, scan_texture
+
+    mesh = _sheet()
+    scan = bridge.mesh_to_object(replace(mesh, colour=vertex_colours(mesh)), "scan")
+    scan_texture.put_pictures(scan, mesh)
+    bpy.context.scene.collection.objects.link(scan)
+    collection = heads.create_head(reference, "Head", scan)
+    asked = []
+
+    def stop(seen, about):
+        asked.append(seen)
+        raise LookupError
+
+    monkeypatch.setattr(materials, "ScanColour", stop)
+    with pytest.raises(LookupError):
+        materials.dress_head(next(obj for obj in collection.objects if heads.is_skin(obj)))
+    assert has_pictures(asked[0])
+
+
 def test_skin_shows_what_a_picture_shows_between_the_vertices_of_a_scan():
     """A line 1.5 mm wide on triangles of 20 mm, none of whose vertices lies on it."""
     from headshop.headshop_addon.scan_colour import LARGE, SIZE, ScanColour
@@ -167,7 +189,7 @@ def test_skin_shows_what_a_picture_shows_between_the_vertices_of_a_scan():
     picture = np.full((400, 400, 3), 200, np.uint8)
     picture[:, 197:203] = 20
     scan = Mesh(points, faces.astype(np.int32), uv=uv, material=np.zeros(25, np.int16), pictures=(picture,))
-    scan = Mesh(**{**scan.__dict__, "colour": np.full((36, 3), 200 / 255, np.float32)})
+    scan = replace(scan, colour=np.full((36, 3), 200 / 255, np.float32))
     asked = np.array([[50.0, 33, 0], [47, 33, 0], [53, 33, 0]])
     up = np.tile([0.0, 0, 1], (3, 1))
     fine = ScanColour(scan, np.array([[30.0, 20, -1], [60, 60, 1]]))

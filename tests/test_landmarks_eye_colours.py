@@ -92,6 +92,37 @@ def test_where_nothing_tells_lids_are_held_open(reference, seen_skin, monkeypatc
         assert 0.75 * usual < opening < 1.25 * usual
 
 
+def test_lids_that_are_seen_to_be_open_are_as_the_scan_has_them_and_others_held(reference, seen_skin, monkeypatch):
+    """Where nothing shows lids, a fit may have them too far open as well as half shut."""
+    target, _ = seen_skin(BOTH)
+    space = shape_space(reference)
+    fit = finish(fit_shape(space, target, HERE))
+    monkeypatch.setattr(expression, "shut_share", lambda *_: {"l": -0.3, "r": -0.2})
+    shown = {}
+    for sight in (False, None):
+        monkeypatch.setattr(expression, "shut_by_sight", lambda *_, sight=sight: sight)
+        shown[sight] = finish(fit_expression(space, target, fit))[1]
+    assert shown == {False: Expression(), None: Expression(wide=True)}
+
+
+def test_a_build_looks_at_the_colours_too(reference, seen_skin, monkeypatch):
+    from headshop.sim.adapt.build import build_head
+    from headshop.sim.landmarks import first_look
+
+    target, marks = seen_skin(BOTH)
+    scan, asked = _coloured(target, marks, True), []
+
+    def stop(space, target, fit, scan):
+        asked.append(scan)
+        raise LookupError
+        yield
+
+    monkeypatch.setattr(first_look, "fit_expression", stop)
+    with pytest.raises(LookupError):
+        finish(build_head(reference, scan, marks))
+    assert asked == [scan]
+
+
 def test_no_lower_lid_is_outlined_above_the_corners():
     """The fold of an upper lid, which steps back and forward as well, passed for a blank eye 14 mm too high."""
     y, x = np.mgrid[20:-20.5:-0.5, -28:28.5:0.5]
