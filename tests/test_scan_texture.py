@@ -47,9 +47,18 @@ def test_points_between_vertices_show_what_the_picture_does_there():
 def test_points_are_as_near_each_other_as_asked_and_cover_every_triangle_evenly():
     points, _, _ = strewn(_square(_picture([RED])), 0.5, np.ones(2, dtype=bool))
     count = len(strewn(_square(_picture([RED])), 0.5, np.array([True, False]))[0])
-    assert len(points) == 2 * count
-    filled, _, _ = np.histogram2d(*points[:, :2].T, bins=10, range=[[0, 10]] * 2)
-    assert filled.min() >= 4 and filled.max() <= 2.5 * filled.min()
+    assert len(points) == 2 * count == pytest.approx(10 * 10 / 0.5**2, rel=0.2)
+    filled, _, _ = np.histogram2d(*points[:, :2].T, bins=5, range=[[0, 10]] * 2)
+    assert filled.min() > 0.7 * filled.mean() and filled.max() < 1.3 * filled.mean()
+
+
+def test_along_a_slender_triangle_points_are_not_far_apart():
+    points = np.array([[0.0, 0, 0], [30, 0, 0], [30, 0.1, 0]])
+    uv = np.array([[[0.0, 0], [1, 0], [1, 1], [0, 0]]], np.float32)
+    faces, material = np.array([[0, 1, 2, -1]], np.int32), np.zeros(1, np.int16)
+    needle = Mesh(points, faces, uv=uv, material=material, pictures=(_picture([RED]),))
+    places = np.sort(strewn(needle, 0.5, np.ones(1, dtype=bool))[0][:, 0])
+    assert np.diff(places).max() < 3 * 0.5
 
 
 def test_texels_are_as_large_as_they_lie_on_the_scan():

@@ -8,6 +8,9 @@ from ..mesh import Mesh, vertex_normals
 #: Texels of a picture that are averaged along each side, at most: more would bleed over the borders of its islands.
 COARSEST = 4
 MOST_PARTS = 64  # into which the side of a triangle is cut
+SLENDER = (
+    1 / 3
+)  # of its longest side, that a triangle counts as wide at least, lest points lie far apart along slender ones
 
 
 def has_pictures(mesh: Mesh) -> bool:
@@ -44,12 +47,13 @@ def vertex_colours(mesh: Mesh) -> np.ndarray:
 def strewn(mesh: Mesh, spacing: float, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Points (k, 3) all over a mesh with pictures, its normals there (k, 3), and their sRGB colours (k, 3) 0..1.
 
-    spacing : how far apart they are, in the mesh's unit; chosen (t,) bool : the triangles that are strewn
+    spacing : how far apart they are about, in the mesh's unit; chosen (t,) bool : the triangles that are strewn
     """
     triangles, some = mesh.triangles, np.flatnonzero(chosen)
     corners = mesh.vertices[triangles[some]]
     longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
-    parts = np.clip(np.ceil(longest / spacing), 1, MOST_PARTS).astype(int)
+    wide = np.sqrt(np.linalg.norm(np.cross(*np.diff(corners, axis=1).swapaxes(0, 1)), axis=1) / 2)
+    parts = np.clip(np.ceil(np.maximum(wide, longest * SLENDER) / spacing), 1, MOST_PARTS).astype(int)
     owner, weights = [], []
     for n in np.unique(parts):
         of, inside = some[parts == n], _spread(n)
@@ -122,19 +126,22 @@ def _size_of_most(area, texels) -> float:
 
 
 def _averaged(picture, texels: float) -> np.ndarray:
-    """``picture`` with so many of its texels along each side made one, as far as that is sensible."""
+    """``picture`` with so many of its texels along each side made one, as far as that is sensible; 0..255 as it is."""
     n = int(np.clip(np.nan_to_num(texels), 1, min(COARSEST, *picture.shape[:2])))
+    if n == 1:
+        return picture
     height, width = (side // n * n for side in picture.shape[:2])
     # whole blocks only: the last rows of a size that is no multiple are as good as their neighbours
-    return picture[:height, :width].reshape(height // n, n, width // n, n, 3).mean(axis=(1, 3)) / 255.0
+    return picture[:height, :width].reshape(height // n, n, width // n, n, 3).mean(axis=(1, 3), dtype=np.float32)
 
 
 def _between(picture, place) -> np.ndarray:
-    """(k, 3), the colours of ``picture`` (h, w, 3) at ``place`` (k, 2), between its texels; it repeats beyond its sides."""
+    """(k, 3) 0..1, the colours of ``picture`` (h, w, 3) 0..255 at ``place`` (k, 2), between its texels; it repeats beyond its
+    sides."""
     height, width = picture.shape[:2]
     x, y = (np.mod(place, 1.0) * [width, height] - 0.5).T
     left, low = np.floor(x).astype(int), np.floor(y).astype(int)
     right, up = (x - left)[:, None], (y - low)[:, None]
     columns, rows = (left % width, (left + 1) % width), (low % height, (low + 1) % height)
     below, above = ((1 - right) * picture[row, columns[0]] + right * picture[row, columns[1]] for row in rows)
-    return (1 - up) * below + up * above
+    return ((1 - up) * below + up * above) / 255.0
