@@ -12,8 +12,10 @@ from scipy.spatial import cKDTree
 
 from ..sim.mesh import Mesh, vertex_normals
 from ..sim.progress import Progress, Work
+from ..sim.scan.colour_space import to_linear, to_srgb
 from ..sim.scan.specks import specks
 from ..sim.scan.texture import has_pictures, strewn, texel_size
+from .scan_texture import fill
 from .skin_paint import adjacency, smoothed, spread
 
 NEIGHBOURS = 4
@@ -25,16 +27,6 @@ SIZE, TEXEL = 768, 0.7  # pixels, and mm that one is large about: finer than mos
 LARGE, FINE = 2048, 0.3
 EVENING = 0.55  # how much of the broad shading is taken out
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
-
-
-def to_linear(colour: np.ndarray) -> np.ndarray:
-    """Linear from sRGB values 0..1."""
-    return np.where(colour <= 0.04045, colour / 12.92, ((colour + 0.055) / 1.055) ** 2.4)
-
-
-def to_srgb(colour: np.ndarray) -> np.ndarray:
-    """sRGB from linear values 0..1."""
-    return np.where(colour <= 0.0031308, colour * 12.92, 1.055 * np.maximum(colour, 0) ** (1 / 2.4) - 0.055)
 
 
 class ScanColour:
@@ -217,9 +209,5 @@ def colour_image(skin: Mesh, source: ScanColour, unseen: np.ndarray, name: str, 
         image = None
     if image is None:
         image = bpy.data.images.new(name, size, size, alpha=False)
-    rgba = np.ones((size, size, 4), dtype=np.float32)
-    rgba[..., :3] = to_srgb(pixels)
-    image.pixels.foreach_set(rgba.ravel())
-    image.update()
-    image.pack()
+    fill(image, to_srgb(pixels))
     return image, colour * gain[:, None]

@@ -104,9 +104,14 @@ def _material(name, picture) -> bpy.types.Material:
 def _image(name, picture) -> bpy.types.Image:
     height, width = picture.shape[:2]
     image = bpy.data.images.new(name, width, height, alpha=False)
-    rgba = np.ones((height, width, 4), dtype=np.float32)
-    rgba[..., :3] = picture / np.float32(255)
+    fill(image, picture / np.float32(255))
+    return image
+
+
+def fill(image: bpy.types.Image, colour: np.ndarray) -> None:
+    """Give ``image`` the ``colour`` (h, w, 3) 0..1, sRGB, first row at the bottom, and pack it into the file."""
+    rgba = np.ones((*colour.shape[:2], 4), dtype=np.float32)
+    rgba[..., :3] = colour
     image.pixels.foreach_set(rgba.ravel())
     image.update()
     image.pack()
-    return image

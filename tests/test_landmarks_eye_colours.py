@@ -4,10 +4,12 @@
 import numpy as np
 import pytest
 
+from headshop.sim.adapt.build import build_head
 from headshop.sim.landmarks import expression
 from headshop.sim.landmarks.blank_eyes import best_outline
 from headshop.sim.landmarks.expression import fit_expression
 from headshop.sim.landmarks.eye_colours import open_by_colours
+from headshop.sim.landmarks.find import find_landmarks
 from headshop.sim.landmarks.pose_search import Pose
 from headshop.sim.landmarks.shape_fit import Expression, fit_shape
 from headshop.sim.landmarks.shape_space import shape_space
@@ -105,22 +107,39 @@ def test_lids_that_are_seen_to_be_open_are_as_the_scan_has_them_and_others_held(
     assert shown == {False: Expression(), None: Expression(wide=True)}
 
 
-def test_a_build_looks_at_the_colours_too(reference, seen_skin, monkeypatch):
-    from headshop.sim.adapt.build import build_head
-    from headshop.sim.landmarks import first_look
+@pytest.fixture
+def asked(monkeypatch):
+    """The scans of which lips and lids were asked; the work ends there, with a LookupError."""
+    from headshop.sim.landmarks import find, first_look
 
-    target, marks = seen_skin(BOTH)
-    scan, asked = _coloured(target, marks, True), []
+    scans = []
 
     def stop(space, target, fit, scan):
-        asked.append(scan)
+        scans.append(scan)
         raise LookupError
         yield
 
+    monkeypatch.setattr(find, "fit_expression", stop)
     monkeypatch.setattr(first_look, "fit_expression", stop)
+    return scans
+
+
+def test_a_build_looks_at_the_colours_too(reference, seen_skin, asked):
+    target, marks = seen_skin(BOTH)
+    scan = _coloured(target, marks, True)
     with pytest.raises(LookupError):
         finish(build_head(reference, scan, marks))
     assert asked == [scan]
+
+
+def test_landmarks_are_found_with_the_colours_where_the_face_is(reference, seen_skin, asked):
+    """Whatever the scan's unit: the colours are looked at in mm, as all else is."""
+    target, marks = seen_skin(BOTH)
+    scan = _coloured(target, marks, True)
+    with pytest.raises(LookupError):
+        finish(find_landmarks(scan.moved(scan.vertices / 1000), reference, (1000.0,)))
+    np.testing.assert_allclose(asked[0].vertices, scan.vertices, atol=1e-9)
+    assert asked[0].colour is scan.colour
 
 
 def test_no_lower_lid_is_outlined_above_the_corners():
@@ -135,22 +154,3 @@ def test_no_lower_lid_is_outlined_above_the_corners():
     eye = 0.8 * (band(0.0, 6.0) - band(0.0, -4.0))
     outline = best_outline(np.clip(fold + eye, -1, 1), 14.0)
     assert outline[5] <= 0 and abs(outline[4] - 6) < 1.5 and abs(outline[5] + 4) < 1.5
-
-
-def test_the_scan_that_is_asked_for_its_colours_stands_where_the_face_is(reference, seen_skin, monkeypatch):
-    """Landmarks are found in any unit: the colours are looked at in mm, as all else is."""
-    from headshop.sim.landmarks import find
-
-    target, marks = seen_skin(BOTH)
-    scan, asked = _coloured(target, marks, True), []
-
-    def stop(space, target, fit, scan):
-        asked.append(scan)
-        raise LookupError
-        yield
-
-    monkeypatch.setattr(find, "fit_expression", stop)
-    with pytest.raises(LookupError):
-        finish(find.find_landmarks(scan.moved(scan.vertices / 1000), reference, (1000.0,)))
-    np.testing.assert_allclose(asked[0].vertices, scan.vertices, atol=1e-9)
-    assert asked[0].colour is scan.colour

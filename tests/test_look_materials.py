@@ -83,8 +83,8 @@ def test_brow_coordinates_mirror(reference):
 
 def _coloured_scan(reference):
     """The skin in front of the tragia as a scan: red on the subject's left, blue on the right."""
-    from headshop.headshop_addon.scan_colour import to_srgb
     from headshop.sim.mesh import Mesh
+    from headshop.sim.scan.colour_space import to_srgb
 
     skin = reference.skin
     seen = skin.vertices[:, 1] < reference.landmark_positions()["t_l"][1]
@@ -108,7 +108,8 @@ def test_the_scans_colours_arrive_and_spread_where_it_has_none(reference):
 
 
 def test_hair_does_not_stain_the_skin_below(reference):
-    from headshop.headshop_addon.scan_colour import ScanColour, to_linear, to_srgb, unseen_skin, vertex_colour
+    from headshop.headshop_addon.scan_colour import ScanColour, unseen_skin, vertex_colour
+    from headshop.sim.scan.colour_space import to_linear, to_srgb
 
     skin, scalp = reference.skin, reference.groups["scalp"] > 0.5
     scan = _coloured_scan(reference)
@@ -214,8 +215,9 @@ def test_staging_twice_leaves_one_stage(bpy, skin):
 
 def test_the_iris_takes_the_scans_colour_only_where_an_eye_was_seen(reference):
     pytest.importorskip("bpy")
-    from headshop.headshop_addon.scan_colour import iris_colour, to_srgb
+    from headshop.headshop_addon.scan_colour import iris_colour
     from headshop.sim.mesh import Mesh
+    from headshop.sim.scan.colour_space import to_srgb
 
     skin = reference.skin.vertices
     eyes = [reference.parts[part].vertices for part in ("eye_l", "eye_r")]

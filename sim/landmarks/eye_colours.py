@@ -19,7 +19,7 @@ FEW = 12  # vertices
 #: Of the skin's own: light that less than is no skin, and more than; and how much bluer that is than the skin.
 DARK, BRIGHT, COOL = 0.45, 1.3, 1.25
 RED = 1.15  # more red than blue: skin. Colours that show anything else, a map of distances for one, tell nothing.
-#: Share of an eye that is no skin. Of 34 open eyes it is .59 and more, of the two shut ones of another scan .005 and less.
+#: Share of an eye that is no skin. Of 36 open eyes it is .59 and more, of the two shut ones of another scan .005 and less.
 SOME, MOST = 0.25, 0.4
 
 
