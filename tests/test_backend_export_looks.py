@@ -206,3 +206,18 @@ def test_without_cycles_it_says_what_to_do(bpy, skin, tmp_path):
     finally:
         addon_utils.enable("cycles")
     assert list(tmp_path.iterdir()) == [] and everything(bpy) == before
+
+
+def test_a_picture_of_colours_is_as_fine_as_the_skins_own_and_not_as_its_relief(bpy):
+    from headshop.headshop_addon import plain_materials
+    from headshop.headshop_addon.shader_nodes import Graph
+
+    def of(side):
+        return bpy.data.images.new("picture", side, 8)
+
+    material, fine, relief = bpy.data.materials.new("Head Shop Skin"), of(2000), of(4000)
+    graph = Graph(material)
+    graph.node("TexImage", image=relief)
+    assert plain_materials._size([material], (relief,)) == plain_materials.SKIN_SIZE
+    graph.node("TexImage", image=fine)
+    assert plain_materials._size([material], (relief,)) == 2000
