@@ -59,6 +59,7 @@ NO_SKIN = (
     ("HELD_BY_LIPS", "Held by Lips", "Leave out what the lips hold, such as a breathing tube"),
     ("HAIR", "Hair", "Leave out hair of the head; the scalp is invented below it"),
     ("GLASSES", "Glasses", "Leave out glasses; what they hide is invented"),
+    ("BEARD", "Beard", "Leave out a beard; chin and cheeks are invented below it"),
 )
 
 

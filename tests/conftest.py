@@ -120,6 +120,35 @@ def laid():
     return make
 
 
+@pytest.fixture(scope="session")
+def bearded(reference):
+    """``bearded(seed, deep, hanging)`` -> a person with a rough beard, ``deep`` mm, that hangs so many mm below the chin: the
+    scan as a surface, the points (n, 3) mm of the skin below, its landmarks, and a face laid on all of the scan."""
+    from functools import cache
+
+    from headshop.sim.adapt.closest import Surface
+    from headshop.sim.landmarks.beards import grows_beard
+    from headshop.sim.landmarks.pose_search import Pose
+    from headshop.sim.landmarks.shape_fit import fit_shape
+    from headshop.sim.landmarks.shape_space import shape_space
+    from headshop.sim.mesh import vertex_normals
+    from headshop.sim.progress import finish
+    from headshop.sim.scan.individual import draw_field
+
+    @cache
+    def make(seed, deep, hanging):
+        space = shape_space(reference)
+        points = space.points + draw_field(reference.landmark_positions(), np.random.default_rng(seed))(space.points)
+        marks, beard = space.landmarks(points), grows_beard(space)
+        rough = deep * (1 + 0.35 * np.random.default_rng(1).standard_normal(len(points)))
+        worn = points + (beard * rough)[:, None] * vertex_normals(points, space.triangles)
+        worn[:, 2] -= hanging * beard * np.clip((marks["li"][2] - points[:, 2]) / 40, 0, 1)
+        target = Surface(worn, space.triangles, smooth=2.0)
+        return target, points, marks, finish(fit_shape(space, target, Pose(1.0, np.eye(3), np.zeros(3), 0.0)))
+
+    return make
+
+
 @pytest.fixture
 def one_look(monkeypatch):
     """Faces are looked for once, quickly, and in one size, so that a scan without any is soon refused."""

@@ -24,6 +24,7 @@ LEFT_OUT = {
     "held_by_lips": "what the lips hold",
     "hair": "hair",
     "glasses": "glasses",
+    "beard": "a beard",
 }
 #: What is advised where a face whose lips are closed seems to smile.
 SMILES_CLOSED = (

@@ -15,8 +15,8 @@ NORMALS = 2.0  # mm over which the scan's normals are averaged
 MOST = 600_000  # triangles of a scan that are all looked at: edges of about 0.7 mm on a head
 ROOM = 0.35  # of the head's size that is kept around it
 #: What of a scan may be no skin: what a depth map has stretched over its jumps, where it was cut off, what the lips hold,
-#: hair, glasses.
-NO_SKIN = ("depth_jumps", "flat_ends", "held_by_lips", "hair", "glasses")
+#: hair, glasses, a beard.
+NO_SKIN = ("depth_jumps", "flat_ends", "held_by_lips", "hair", "glasses", "beard")
 
 
 def to_leave_out(choice: str) -> frozenset[str]:

@@ -13,6 +13,7 @@ from ..mesh import Mesh
 from ..progress import Progress, Work, portion
 from ..scan.depth_jumps import depth_jumps
 from .above_beard import without_beards_lead
+from .beards import beard_over
 from .confidence import judge, judge_together, like_ears, sure_as_corners
 from .expression import fit_expression, line_of, meeting_lids, outline_of
 from .glasses import fit_without_glasses, glasses_seen
@@ -92,13 +93,17 @@ def _finding(mesh: Mesh, reference: Head | None, unit_scales, any_size: bool) ->
     placing = place_face(mesh, reference, space, unit_scales, any_size)
     scale, fit, target, space = yield from portion(placing, 0.05, 0.75)
     fit = yield from portion(with_likelier_ears(space, target, fit), 0.75, 0.77)
+    beard, above = None, not space.area.all()
+    space = shape_space(reference) if above else space
     if not space.of_infants:
-        fit = yield from portion(without_beards_lead(reference, space, target, fit), 0.77, 0.79)
+        fit, beard = yield from portion(without_beards_lead(reference, space, target, fit, above), 0.77, 0.79)
+        target = target.without(beard_over(space, beard, target))
     fit, telling = yield from run(fit_without_glasses(space, target, fit), 0.79, 0.8, "Looking for glasses")
     target = target.without(glasses_seen(space, telling, target))
     scan = scan.moved(scan.vertices * scale)
     whole = space
-    fit, space = yield from run(with_unseen_jaw(space, target, fit), 0.8, 0.81, "Looking for the mouth")
+    if beard is None:
+        fit, space = yield from run(with_unseen_jaw(space, target, fit), 0.8, 0.81, "Looking for the mouth")
     if space.of_infants:
         fit = yield from run(with_mouth_in_place(space, target, fit), 0.81, 0.82, "Looking for the mouth")
     misfit = misfit_of(space, fit)
@@ -114,7 +119,7 @@ def _finding(mesh: Mesh, reference: Head | None, unit_scales, any_size: bool) ->
     bare = target.without(hair_over(space, fit, target, hair.covered & ~in_face(space, fit, {}, 0.0)))
     seen = Mesh.from_triangles(bare.vertices, bare.triangles)
     other = yield from portion(weighed(seen, positions, confidence, reference, bare), 0.9, 1.0)
-    if telling is not None:  # over holes as wide as lenses a relaxed map tells less than the shape, over others as much
+    if telling or beard:  # over holes as wide as those a relaxed map tells less than the shape, over others as much
         other |= {n: positions[n] for n in mid_air}
     positions = better_of(positions, other, shown.parted or space is not whole, fit.pose.scale)
     lids = meeting_lids(space, fit, target, shown.shut) | shown.lids

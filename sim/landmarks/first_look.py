@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A first look at a scan with the landmarks given: a plausible head laid on it tells what they do not.
 
-Where lids are, what hangs out of the mouth and is no skin, what are glasses, and what is hair.
+Where lids are, what hangs out of the mouth and is no skin, what are glasses, and what is hair, of the head or a beard.
 """
 
 from collections.abc import Collection
@@ -16,8 +16,10 @@ from ..adapt.skin_fit import SkinFit
 from ..adapt.thin_plate_spline import similarity
 from ..anatomy.head import Head
 from ..mesh import Mesh
-from ..progress import Work
+from ..progress import Work, portion
 from ..relax.mouth_gap import MARKS
+from .above_beard import without_beards_lead
+from .beards import OVER_SKIN, beard_over
 from .confidence import in_mid_air
 from .expression import fit_expression
 from .glasses import BEFORE_SKIN, fit_without_glasses, glasses_seen
@@ -37,17 +39,17 @@ LOOKING = "Looking at lids and lips"
 #: Landmarks about which skin is much the same, so that a plausible head does not tell where they are.
 UNTOLD = ("tr", "eu")
 BESIDE_FACE = 11.0  # mm from the face's outline: what lies within and may be skin is as scanned
-KINDS = ("held_by_lips", "hair", "glasses")  # of `NO_SKIN`, those that a face tells
+KINDS = ("held_by_lips", "hair", "glasses", "beard")  # of `NO_SKIN`, those that a face tells
 FEWEST = 4  # landmarks that tell where the head is
 
 
 @dataclass(frozen=True, eq=False)
 class FirstLook:
     """landmarks : name -> (3,) mm, those given and those of lids that are seen; lips : about where their landmarks are if
-    they are parted, if only a little, or None; target : the scan without what the lips hold, hair and glasses; left_out : how
-    much of it that is, mm²; filled : with skin behind it, and where it lacks the scalp, as that probably is; hidden (k,) :
-    vertices of the reference's skin that make that up; guessed : name -> (3,) mm, about where others are; laid : the same of
-    those given that the face tells, where it has them itself."""
+    they are parted, if only a little, or None; target : the scan without what the lips hold, hair, glasses and beards;
+    left_out : how much of it that is, mm²; filled : with skin behind it, and where it lacks the scalp, as that probably is;
+    hidden (k,) : vertices of the reference's skin that make that up; guessed : name -> (3,) mm, about where others are; laid :
+    the same of those given that the face tells, where it has them itself."""
 
     landmarks: dict[str, np.ndarray]
     target: Surface
@@ -77,7 +79,7 @@ def first_look(
 ) -> Work:
     """Work returning the `FirstLook` at the scan ``target`` with the landmarks ``given`` (name -> (3,) mm).
 
-    leave_out : of `NO_SKIN`; what the lips hold, glasses, or hair, is taken for skin where it is not among them
+    leave_out : of `NO_SKIN`; what the lips hold, glasses, hair, or a beard, is taken for skin where it is not among them
     found : names of those given that nobody picked: in mid-air they are guesses, and of an infant they tell nothing
     scan : its vertices, mm, and their colours, which tell whether eyes are open
     """
@@ -97,15 +99,24 @@ def first_look(
     coarse, jaw_told = target.coarser(), any(name in given for name in JAW)
     try:
         fit = yield from run(fit_shape(space, coarse, pose, told=told), 0.0, 0.5, LOOKING)
-        telling = None
+        beard = telling = None
+        if "beard" in leave_out and not space.of_infants:
+            work = without_beards_lead(reference, space, coarse, fit, rough=True)
+            fit, beard = yield from portion(work, 0.5, 0.53)
+        grown = beard_over(space, beard, target)
+        bearded = target.vertices[target.triangles[grown].ravel()]
+        beard_area = target.area[grown].sum()
+        if grown.any():
+            target = target.without(grown)
+            coarse = target.coarser()
         if "glasses" in leave_out:
-            fit, telling = yield from run(fit_without_glasses(space, coarse, fit), 0.5, 0.55, LOOKING)
+            fit, telling = yield from run(fit_without_glasses(space, coarse, fit), 0.53, 0.55, LOOKING)
         worn = glasses_seen(space, telling, target)
-        glasses = target.vertices[target.triangles[worn].ravel()]
+        glasses, glasses_area = target.vertices[target.triangles[worn].ravel()], target.area[worn].sum()
         if worn.any():
             target = target.without(worn)
             coarse = target.coarser()
-        if not jaw_told:
+        if not jaw_told and beard is None:
             fit, space = yield from run(with_unseen_jaw(space, coarse, fit), 0.55, 0.58, LOOKING)
         if space.of_infants:
             fit = yield from run(with_mouth_in_place(space, coarse, fit), 0.58, 0.6, LOOKING)
@@ -136,7 +147,8 @@ def first_look(
     left = target.without(held | shows)
     hidden = hidden_skin(space, fit, target.vertices[target.triangles[held].ravel()], left)
     hidden |= hidden_skin(space, fit, glasses, left, BEFORE_SKIN)
-    if not jaw_told:
+    hidden |= hidden_skin(space, fit, bearded, left, OVER_SKIN)
+    if not jaw_told and beard is None:
         hidden |= unseen_jaw(space, fit, left)
     picks = np.reshape([given[n] for n in names if n not in found], (-1, 3))
     hidden |= unseen_face(space, fit, left, picks[in_mid_air(left, picks)])
@@ -145,7 +157,7 @@ def first_look(
     filled = with_hidden_skin(space, hair.fit, covered & no_ear, filled)
     unseen = unseen_scalp(space, hair.scalp, left) & ~covered & (not kept)  # what lies far below hair is not unseen
     filled = with_hidden_skin(space, hair.scalp, unseen & no_ear, filled, UNSEEN)
-    areas = (target.area[held].sum(), target.area[shows].sum(), whole.area[worn].sum())
+    areas = (target.area[held].sum(), target.area[shows].sum(), glasses_area, beard_area)
     out = dict(zip(KINDS, map(float, areas), strict=True))
     own = {n: places[n] for n in clear if n in places}
     return FirstLook(landmarks, left, filled, lips, out, space.vertices[hidden | covered | unseen], guessed, own)

@@ -14,6 +14,7 @@ class Look:
 
     infant : whether it is an infant's face that is looked for
     half : whether it is one half of a face, either one, all that a scan from the side shows
+    above : whether only what lies above a beard, and the lips, are
     size : of the reference's, the face that is looked for to begin with
     starts, survivors : see `search_poses`
     tried : placements that are looked at closely
@@ -28,6 +29,7 @@ class Look:
 
     infant: bool
     half: bool
+    above: bool
     size: float
     starts: int
     survivors: int
@@ -42,21 +44,22 @@ class Look:
 
 #: The first shows most faces. The second, for half of one, is taken if it shows no plain face or little of one. If there is
 #: no plain face yet the third is, a thorough one, which begins with a small face, because a large one on a small head finds
-#: no hold. If that shows none, the last looks for an infant's.
+#: no hold. If that shows none, an infant's is looked for, and then one that is bearded or muffled up.
 QUICK = (
-    Look(False, False, 1.0, STARTS, SURVIVORS, 10, 3, 1.25, 5, 2, 0.53, 0.0),
-    Look(False, True, 1.0, STARTS, SURVIVORS, 4, 2, 1.25, 2, 1, 0.7, 2.0),
+    Look(False, False, False, 1.0, STARTS, SURVIVORS, 10, 3, 1.25, 5, 2, 0.53, 0.0),
+    Look(False, True, False, 1.0, STARTS, SURVIVORS, 4, 2, 1.25, 2, 1, 0.7, 2.0),
 )
 LOOKS = (
     *QUICK,
-    Look(False, False, 0.8, 1000, 400, 14, 4, np.inf, 4, 4, 0.7, 2.0),
-    Look(True, False, 0.7, 1000, 400, 14, 4, np.inf, 4, 4, 0.7, 2.0),
+    Look(False, False, False, 0.8, 1000, 400, 14, 4, np.inf, 4, 4, 0.7, 2.0),
+    Look(True, False, False, 0.7, 1000, 400, 14, 4, np.inf, 4, 4, 0.7, 2.0),
+    Look(False, False, True, 1.0, STARTS, SURVIVORS, 10, 3, 1.25, 5, 2, 0.8, 2.0),
 )
 #: The first, but shorter, for a face that may have any size: it is taken at many.
 ANY_SIZE = replace(LOOKS[0], tried=4, most=2, further=3, again=1)
 #: Shares of the work at which trials of each look begin, and its fits begin and end. Between the first and the second a face
 #: may be looked for in any size.
-PARTS = ((0.0, 0.4, 0.55), (0.7, 0.73, 0.75), (0.75, 0.83, 0.88), (0.88, 0.94, 0.98))
+PARTS = ((0.0, 0.4, 0.55), (0.7, 0.73, 0.75), (0.75, 0.82, 0.86), (0.86, 0.91, 0.94), (0.94, 0.96, 0.98))
 SIZED = 0.7  # share at which that is done
 MIDDLE = 6.0  # mm: so far half a face goes beyond the middle
 WHOLE = 0.65  # share of a face that finds the scan, below which half of one is looked for as well

@@ -12,6 +12,7 @@ from ..mesh import Mesh
 from ..progress import Work, portion
 from ..scan.face_match import face_template
 from .any_size import face_of_any_size, of_human_size, of_most
+from .beards import above_beard, template_above
 from .confidence import like_ears
 from .infant import infant_points, infant_space
 from .looking import FITTING, SIZE, TRIAL_MODES, lies, looked, run
@@ -54,7 +55,9 @@ def place_face(mesh: Mesh, reference: Head, space: ShapeSpace, unit_scales, any_
 
     for look, (low, middle, high) in zip(LOOKS, PARTS, strict=True):
         if look.infant:
-            space, template = infant_space(reference, space), infant_points(reference, template)
+            space, template = infant_space(reference, grown), infant_points(reference, face_template(reference))
+        elif look.above:
+            space, template = above_beard(grown), template_above(grown, face_template(reference))
         split = (middle - low) / (high - low)
         seen += yield from portion(looked(look, mesh, reference, space, template, unit_scales, split), low, high)
         best = min(seen, key=_by_likeness if look.infant else lambda t: t[0]) if seen else None

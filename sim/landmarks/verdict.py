@@ -59,7 +59,7 @@ def likeness_of(reference: Head, space: ShapeSpace, fit: ShapeFit) -> float:
     """How much relief of a face the scan has where the skin was laid on it, see `adapt.relief`."""
     skin = reference.skin.vertices @ fit.matrix.T + fit.pose.shift
     fitted = np.zeros(len(skin))
-    skin[space.vertices], fitted[space.vertices] = fit.points, fit.trust
+    skin[space.vertices], fitted[space.vertices] = fit.points, fit.trust * (space.area > 0)
     return face_likeness(reference, skin, fitted)
 
 

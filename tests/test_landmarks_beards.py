@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Beards are told from the face and left out, and chin and cheeks are invented below them."""
+
+import numpy as np
+import pytest
+
+from headshop.sim.adapt.scan_surface import NO_SKIN
+from headshop.sim.anatomy.landmark_names import SKIN
+from headshop.sim.landmarks import looks, placed_face
+from headshop.sim.landmarks.beards import above_beard, beard_over, grows_beard, heights, lips_beside, thick_beard
+from headshop.sim.landmarks.find import find_landmarks
+from headshop.sim.landmarks.first_look import first_look
+from headshop.sim.landmarks.shape_space import shape_space
+from headshop.sim.mesh import Mesh
+from headshop.sim.progress import finish
+
+WORN = (3, 12, 25)
+
+
+@pytest.fixture(scope="module")
+def space(reference):
+    return shape_space(reference)
+
+
+@pytest.fixture(scope="module")
+def chin(space):
+    """(n,) bool: the points of the skin on which most of a beard grows."""
+    return grows_beard(space) & (space.face > 0.5)
+
+
+def _given(marks):
+    """Landmarks that a beard does not hide."""
+    hidden = ("pg", "gn", "go", "sl")
+    return {n: p for n, p in marks.items() if n in SKIN and n.partition("_")[0] not in hidden}
+
+
+def test_where_beards_grow(reference):
+    space = shape_space(reference)
+    beard, marks = grows_beard(space), space.landmarks(space.points)
+
+    def there(place):
+        return beard[np.linalg.norm(space.points - place, axis=1).argmin()]
+
+    upper_lip = 0.5 * (marks["sn"] + marks["ls"])
+    assert all(there(place) for place in (marks["pg"], marks["gn"], marks["go_l"], marks["go_r"], upper_lip))
+    assert not any(there(marks[name]) for name in ("ls", "li", "ch_l", "sn", "prn", "zy_l", "t_r", "op", "g"))
+    assert not beard[space.ear > 0.5].any()
+
+
+def test_a_beard_stands_off_the_skin_and_is_rough(space, bearded, laid, chin):
+    target, points, _, _ = bearded(*WORN)
+    bare, _, _, _ = bearded(3, 0, 0)
+    high, rough = heights(space, laid(space, points), target)
+    assert 8 < np.median(high[chin]) < 20 and np.median(rough[chin]) > 0.2
+    high, rough = heights(space, laid(space, points), bare)
+    assert np.abs(np.median(high[chin])) < 0.1 and np.median(rough[chin]) < 0.1
+    assert not high[~grows_beard(space)].any()
+
+
+def test_a_beard_is_left_out_and_the_lips_are_not(space, bearded, laid, chin):
+    target, points, _, _ = bearded(*WORN)
+    beard = thick_beard(space, laid(space, points), target)
+    over = beard_over(space, beard, target)[:, None] & np.ones(3, dtype=bool)
+    left_out = np.bincount(target.triangles.ravel(), over.ravel(), len(points)) > 0
+    assert left_out[chin].mean() > 0.97 and left_out[lips_beside(space)].mean() < 0.3
+    assert not left_out[(space.face > 0.5) & (space.points[:, 2] > space.landmarks(space.points)["en_l"][2])].any()
+    assert not beard_over(space, None, target).any()
+
+
+def test_what_hangs_before_the_throat_is_left_out_too(space, bearded, laid):
+    target, points, marks, _ = bearded(*WORN)
+    sheet = marks["gn"] + [[-15, -5, -5], [15, -5, -5], [15, -5, -50], [-15, -5, -50]]
+    longer = target.beside(sheet, np.array([[0, 2, 1], [0, 3, 2]]))
+    beard = thick_beard(space, laid(space, points), longer)
+    assert beard_over(space, beard, longer)[-2:].all()
+
+
+def test_a_chin_is_invented_below_a_beard(reference, space, bearded, chin):
+    target, points, marks, _ = bearded(*WORN)
+    look = finish(first_look(reference, target, _given(marks), ["beard"]))
+    assert look.left_out["beard"] == pytest.approx(target.area.sum() - look.target.area.sum())
+    assert look.left_out["beard"] > 0.9 * target.area[chin[target.triangles].all(axis=1)].sum()
+    below = look.filled.closest(points[chin]).distance
+    assert np.mean(below) < 4.0 and np.percentile(below, 95) < 9.0
+    assert np.mean(look.target.closest(points[chin]).distance) > 9.0
+    assert np.isin(space.vertices[chin], look.hidden).mean() > 0.9
+
+
+def test_whoever_wants_to_keep_it_does(reference, bearded):
+    target, _, marks, _ = bearded(*WORN)
+    look = finish(first_look(reference, target, _given(marks), set(NO_SKIN) - {"beard"}))
+    assert look.left_out["beard"] == 0.0 and look.target.area.sum() > 0.95 * target.area.sum()
+
+
+def test_a_bare_chin_is_no_beard(reference, bearded):
+    target, _, marks, _ = bearded(3, 0, 0)
+    assert finish(first_look(reference, target, marks)).left_out["beard"] == 0.0
+
+
+def test_landmarks_of_a_bearded_face(reference, bearded):
+    target, _, marks, _ = bearded(*WORN)
+    found = finish(find_landmarks(Mesh.from_triangles(target.vertices, target.triangles), reference))
+    off = {n: np.linalg.norm(p - marks[n]) for n, p in found.positions.items() if n in marks}
+    assert np.mean([off[n] for n in ("ls", "sto", "li", "ch_l", "ch_r")]) < 5.0
+    assert {"pg", "gn", "sl"} <= set(found.mid_air) and not {"pg", "gn", "sl"} & set(found.sure())
+    assert max(off["pg"], off["gn"]) < 15.0
+
+
+def test_a_face_that_nothing_but_its_upper_half_and_lips_shows_is_found(reference, space, bearded, monkeypatch):
+    """As of a bald man with a large beard, whose whole face is taken for none in any other look."""
+    monkeypatch.setattr(placed_face, "LOOKS", looks.LOOKS[-1:])
+    monkeypatch.setattr(placed_face, "PARTS", looks.PARTS[-1:])
+    target, _, marks, _ = bearded(8, 16, 30)
+    mesh = Mesh.from_triangles(target.vertices, target.triangles)
+    _, fit, _, of = finish(placed_face.place_face(mesh, reference, space, (1.0,)))
+    assert not of.area[grows_beard(space)].any() and np.array_equal(of.area, above_beard(space).area)
+    laid_on = of.landmarks(fit.points)
+    assert np.mean([np.linalg.norm(laid_on[n] - marks[n]) for n in ("prn", "sn", "n", "en_l", "ex_r", "sto")]) < 4.0
+    found = finish(find_landmarks(mesh, reference))
+    assert {"pg", "gn"} <= set(found.mid_air)
