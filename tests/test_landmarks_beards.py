@@ -10,6 +10,7 @@ from headshop.sim.landmarks import looks, placed_face
 from headshop.sim.landmarks.beards import above_beard, beard_over, grows_beard, heights, lips_beside, thick_beard
 from headshop.sim.landmarks.find import find_landmarks
 from headshop.sim.landmarks.first_look import first_look
+from headshop.sim.landmarks.picked import moved
 from headshop.sim.landmarks.shape_space import shape_space
 from headshop.sim.mesh import Mesh
 from headshop.sim.progress import finish
@@ -84,6 +85,17 @@ def test_a_chin_is_invented_below_a_beard(reference, space, bearded, chin):
     assert np.mean(below) < 4.0 and np.percentile(below, 95) < 9.0
     assert np.mean(look.target.closest(points[chin]).distance) > 9.0
     assert np.isin(space.vertices[chin], look.hidden).mean() > 0.9
+
+
+def test_landmarks_picked_on_a_chin_below_a_beard_tell_where_it_is(reference, bearded):
+    target, _, marks, _ = bearded(*WORN)
+    chin = {n: marks[n] for n in ("sl", "pg", "gn")}
+    at = {n: p + moved(n) for n, p in chin.items()}
+    off = []
+    for given, found in (({}, ()), (at, ()), ({n: p + [0, 9, 0] for n, p in at.items()}, tuple(at))):
+        look = finish(first_look(reference, target, _given(marks) | given, ["beard"], found))
+        off.append(np.abs(look.filled.closest(np.array([chin["pg"], chin["gn"]])).distance).mean())
+    assert off[1] < 0.7 and off[0] > 2 * off[1] and off[2] == pytest.approx(off[0], abs=0.3)
 
 
 def test_whoever_wants_to_keep_it_does(reference, bearded):

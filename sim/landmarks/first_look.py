@@ -24,7 +24,7 @@ from .confidence import in_mid_air
 from .expression import fit_expression
 from .glasses import BEFORE_SKIN, fit_without_glasses, glasses_seen
 from .held_by_lips import held_by_lips
-from .hidden_skin import UNSEEN, hidden_skin, unseen_face, unseen_scalp, with_hidden_skin
+from .hidden_skin import COVERED, TOLD, UNSEEN, hidden_skin, unseen_face, unseen_scalp, with_hidden_skin
 from .infant import likelier_space, with_mouth_in_place
 from .lids_told import lids_told
 from .looking import facing_out, run
@@ -147,12 +147,16 @@ def first_look(
     left = target.without(held | shows)
     hidden = hidden_skin(space, fit, target.vertices[target.triangles[held].ravel()], left)
     hidden |= hidden_skin(space, fit, glasses, left, BEFORE_SKIN)
-    hidden |= hidden_skin(space, fit, bearded, left, OVER_SKIN)
+    under = hidden_skin(space, fit, bearded, left, OVER_SKIN)
     if not jaw_told and beard is None:
         hidden |= unseen_jaw(space, fit, left)
     picks = np.reshape([given[n] for n in names if n not in found], (-1, 3))
     hidden |= unseen_face(space, fit, left, picks[in_mid_air(left, picks)])
-    filled = with_hidden_skin(space, fit, hidden, left)
+    filled = with_hidden_skin(space, fit, hidden & ~under, left)
+    below = {n for n, corners in zip(space.names, space.corners, strict=True) if under[corners].all()}
+    chin = {n: given[n] - fit.matrix @ moved(n) for n in clear if n in below and n not in found}
+    filled = with_hidden_skin(space, fit, under, filled, TOLD if chin else COVERED, chin)
+    hidden |= under
     no_ear = space.ear < EAR  # ears take the reference's shape
     filled = with_hidden_skin(space, hair.fit, covered & no_ear, filled)
     unseen = unseen_scalp(space, hair.scalp, left) & ~covered & (not kept)  # what lies far below hair is not unseen

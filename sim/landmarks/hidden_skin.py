@@ -23,9 +23,9 @@ NO_DATA = 20.0  # mm from unseen scalp to the scan, at least
 TRUSTED = 0.3  # of `ShapeFit.trust`
 #: Of `ShapeSpace.ear`: from there on a place tells how this ear is shaped, not where the skin beside it lies.
 EARLESS = 0.05
-#: mm, of skin behind something, and of skin that nothing shows: how far about it is looked, and of heights their deviation and
-#: how far they go together.
-COVERED, UNSEEN = (30.0, 2.0, 9.0), (60.0, 4.0, 25.0)
+#: mm, of skin behind something, of such of which landmarks tell, and of skin that nothing shows: how far about it is looked,
+#: and of heights their deviation and how far they go together.
+COVERED, TOLD, UNSEEN = (30.0, 2.0, 9.0), (45.0, 3.0, 20.0), (60.0, 4.0, 25.0)
 ROUGH = 0.5  # mm: deviation of each height
 ALIKE = 0.8  # correlation of left and right
 
@@ -63,10 +63,13 @@ def unseen_face(space: ShapeSpace, fit: ShapeFit, target: Surface, known=()) -> 
     return out
 
 
-def with_hidden_skin(space: ShapeSpace, fit: ShapeFit, hidden, left: Surface, heights=COVERED) -> Surface:
+def with_hidden_skin(
+    space: ShapeSpace, fit: ShapeFit, hidden, left: Surface, heights=COVERED, picks: dict[str, np.ndarray] | None = None
+) -> Surface:
     """The scan ``left`` with the ``hidden`` (n,) bool skin in its place, where that probably is.
 
-    heights : `COVERED` or `UNSEEN`, how those of a scan vary there
+    heights : `COVERED`, `TOLD` or `UNSEEN`, how those of a scan vary there
+    picks : name -> (3,) mm, landmarks that are known there
     """
     about, spread, together = heights
     patch = space.triangles[hidden[space.triangles].any(axis=1)]
@@ -79,8 +82,17 @@ def with_hidden_skin(space: ShapeSpace, fit: ShapeFit, hidden, left: Surface, he
     near |= cKDTree(space.points[used]).query(space.points)[0] < about
     known = np.flatnonzero(near & (trust > TRUSTED) & (space.ear < EARLESS))
     off = np.einsum("ij,ij->i", place[known] - fit.points[known], normals[known])
-    system = alike(space.points[known], space.points[known], together, ALIKE)
+    there = space.points[known]
+    if picks:
+        rows = [space.names.index(name) for name in picks]
+        laid, across, picked = (
+            np.einsum("kij,ki->kj", field[space.corners[rows]], space.weights[rows])
+            for field in (fit.points, normals, space.points)
+        )
+        off = np.r_[off, np.einsum("ij,ij->i", np.array(list(picks.values())) - laid, across)]
+        there = np.concatenate([there, picked])
+    system = alike(there, there, together, ALIKE)
     system[np.diag_indices_from(system)] += (ROUGH / spread) ** 2
-    out = alike(space.points[used], space.points[known], together, ALIKE) @ cho_solve(cho_factor(system), off)
+    out = alike(space.points[used], there, together, ALIKE) @ cho_solve(cho_factor(system), off)
     points = fit.points[used] + out[:, None] * normals[used]
     return left.beside(points, corners.reshape(-1, 3))
