@@ -3,6 +3,7 @@
 
 from collections import deque
 from dataclasses import replace
+from pathlib import Path, PurePosixPath
 
 import bpy
 import numpy as np
@@ -71,6 +72,24 @@ def pixels_of(image: bpy.types.Image) -> np.ndarray | None:
     finally:
         if scratch is not None:
             bpy.data.images.remove(scratch)
+
+
+def picture_beside(path: Path, name: str) -> np.ndarray | None:
+    """`pixels_of` the picture that the file at ``path`` calls ``name``, or of that of its name beside the file; None: there is
+    none, or none that can be read."""
+    relative = name.replace("\\", "/")  # written on Windows
+    for place in (path.parent / relative, path.parent / PurePosixPath(relative).name):
+        if not place.is_file():
+            continue
+        try:
+            image = bpy.data.images.load(str(place.resolve()))
+        except RuntimeError:
+            return None
+        try:
+            return pixels_of(image)
+        finally:
+            bpy.data.images.remove(image)
+    return None
 
 
 def _plain(material) -> np.ndarray | None:
