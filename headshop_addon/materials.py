@@ -11,6 +11,7 @@ from scipy.spatial import cKDTree
 from ..sim.anatomy.head import MATERIALS, Eye, Head, Muscle
 from ..sim.mesh import Mesh
 from ..sim.progress import Progress, Work, finish, portion
+from ..sim.scan.shown_skin import shown_skin
 from . import bridge, heads
 from .anatomy_materials import FIBRE, REST, anatomy_material
 from .detail_images import images_of
@@ -43,6 +44,10 @@ def dressing(skin: bpy.types.Object) -> Work:
     scan = _coloured_scan(skin)
     seen = None if scan is None else ScanColour(scan, head.parts["skin"].vertices)
     iris = None if seen is None else iris_colour(seen.scan, head.eyes)
+    hidden = bridge.read_attribute(skin.data, "hidden")
+    if seen is not None:
+        at = head.landmark_positions()
+        seen.trust = shown_skin(seen.points, seen.colour, head.parts["skin"], head.groups, at, head.eyes, hidden)
     objects = heads.parts_of(skin)
     for part, obj in objects.items():
         mesh = head.parts[part]
@@ -50,7 +55,7 @@ def dressing(skin: bpy.types.Object) -> Work:
         if part == "skin":
             yield Progress(0.1, "Painting the skin")
             paint_skin(obj, mesh, head.groups, place, {n: axes @ p for n, p in head.landmark_positions().items()})
-            unseen = unseen_skin(mesh, head.groups["inner"], bridge.read_attribute(skin.data, "hidden"))
+            unseen = unseen_skin(mesh, head.groups["inner"], hidden)
             own = yield from portion(_own_skin(skin, mesh, seen, unseen), 0.2, 0.85)
             yield Progress(0.85, "Dressing the head")
         elif part in ("eye_l", "eye_r"):

@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 
 from ..sim.mesh import Mesh, vertex_normals
 from ..sim.progress import Progress, Work
-from ..sim.scan.colour_space import to_linear, to_srgb
+from ..sim.scan.colour_space import LUMINANCE, to_linear, to_srgb
 from ..sim.scan.specks import specks
 from ..sim.scan.texture import has_pictures, strewn, texel_size
 from .scan_texture import fill
@@ -26,7 +26,6 @@ SIZE, TEXEL = 768, 0.7  # pixels, and mm that one is large about: finer than mos
 #: Of a scan with pictures on it: pixels of the finest image, and mm between the points at which those are looked at, at least.
 LARGE, FINE = 2048, 0.3
 EVENING = 0.55  # how much of the broad shading is taken out
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 
 class ScanColour:
@@ -35,8 +34,9 @@ class ScanColour:
     scan : Mesh in mm, with colours, standing where the skin stands
     about (k, 3) mm : of a scan with pictures on it, only what is near these points is looked at (None: all of it)
 
-    It has the ``scan``; where pictures on it show more than its vertices, as points between those; and the ``size`` in pixels
-    of an image that shows all of it.
+    It has the ``scan``; where pictures on it show more than its vertices, as points between those; the ``size`` in pixels
+    of an image that shows all of it; and of what is looked at the ``points`` (k, 3) mm, their linear ``colour`` (k, 3), and the
+    ``trust`` (k,) 0..1, at first 1, that they show what is asked for, such as skin.
     """
 
     def __init__(self, scan: Mesh, about: np.ndarray | None = None):
@@ -45,10 +45,11 @@ class ScanColour:
         if has_pictures(scan):
             scan, normals, spacing = _between_vertices(scan, whole, about)
             whole, self.size = slice(None), _size_for(spacing)
-        points = scan.vertices[whole]
+        self.points = points = scan.vertices[whole]
         self.scan = scan
         self.normals = normals[whole]
         self.colour = to_linear(np.asarray(scan.colour, dtype=float)[whole])
+        self.trust = np.ones(len(points))
         self.tree = cKDTree(points)
         some = points[:: max(len(points) // 2000, 1)]
         self.spacing = float(np.median(self.tree.query(some, k=2)[0][:, 1]))
@@ -60,12 +61,15 @@ class ScanColour:
         index = np.minimum(index, len(self.colour) - 1)  # where nothing is in reach, at an infinite distance
         # what faces another way is the other side of something thin, such as an ear
         facing = np.clip(np.einsum("knj,kj->kn", self.normals[index], normals) * 2 - 0.2, 0, 1)
-        weight = facing / (distance + 0.3 * self.spacing) ** 2
+        near_by = facing / (distance + 0.3 * self.spacing) ** 2
+        weight = near_by * self.trust[index]
         total = weight.sum(axis=1, keepdims=True)
         colour = (self.colour[index] * weight[..., None]).sum(axis=1) / np.maximum(total, 1e-12)
         near = self.spacing + NEAR
         confidence = np.clip((near + FAR - NEAR - distance[:, 0]) / (FAR - NEAR), 0, 1) * facing.max(axis=1)
-        return colour, confidence
+        trust = total[:, 0] / np.maximum(near_by.sum(axis=1), 1e-12)
+        # a little confidence is enough to hold a membrane: what is probably something else gives it none
+        return colour, confidence * np.clip(2 * trust - 1, 0, 1)
 
 
 def _between_vertices(scan: Mesh, whole: np.ndarray, about: np.ndarray | None):

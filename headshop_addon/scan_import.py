@@ -17,12 +17,12 @@ from ..sim.cylindrical.map_files import EXTENSIONS as MAPS
 from ..sim.cylindrical.map_files import is_range_map, read_range_map
 from ..sim.errors import InputError
 from ..sim.mesh import Mesh
-from ..sim.scan.ply import read_ply
+from ..sim.scan.ply import read_textured_ply
 from ..sim.scan.texture import has_pictures, vertex_colours
 from ..sim.scan.whole_files import require_whole
 from . import bridge
 from .quiet import quiet
-from .scan_texture import with_pictures
+from .scan_texture import picture_beside, with_pictures
 
 # Landmarks are given in the file's own axes, so OBJ and STL come in unturned, and glTF is turned back (`_FILE_AXES`).
 _RAW_AXES = {"forward_axis": "Y", "up_axis": "Z"}
@@ -96,7 +96,7 @@ def read_scan(path) -> Mesh:
     path = check_file(path)
     extension = path.suffix.lower()
     if extension == ".ply":
-        return read_ply(path)
+        return _read_ply(path)
     if is_range_map(path):
         return to_mesh(read_range_map(path))
     require_whole(path)
@@ -114,6 +114,17 @@ def read_scan(path) -> Mesh:
         raise InputError(f"{path} holds no mesh that can be read as {extension[1:].upper()}: export the scan again.")
     scan = joined(meshes)
     return scan.moved(scan.vertices @ _FILE_AXES[extension].T) if extension in _FILE_AXES else scan
+
+
+def _read_ply(path: Path) -> Mesh:
+    """The mesh of a PLY file with the pictures that it names, so far as they lie beside it and can be read."""
+    mesh, names = read_textured_ply(path)
+    if mesh.uv is None:
+        return mesh
+    with quiet():
+        pictures = tuple(picture_beside(path, name) for name in names)
+    none = (None,) if mesh.material.max() == len(names) else ()  # for the faces that show none
+    return joined([replace(mesh, pictures=(*pictures, *none))])
 
 
 def _reason(error: Exception, printed: str) -> str:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Pictures on a scan: read from the materials of its objects, and put on the object that it becomes."""
 
-from collections import deque
 from dataclasses import replace
+from pathlib import Path, PurePosixPath
 
 import bpy
 import numpy as np
@@ -11,6 +11,7 @@ from ..sim.mesh import Mesh
 from ..sim.scan.colour_space import to_srgb
 from ..sim.scan.texture import has_pictures
 from .shader_nodes import Graph
+from .shown_image import image_of
 
 LARGEST = 4096  # pixels of a side: larger pictures are made smaller, for the skin's own is far smaller yet
 
@@ -26,27 +27,6 @@ def with_pictures(mesh: Mesh, obj: bpy.types.Object) -> Mesh:
         return mesh
     pictures = (read[i] if i is not None else _plain(m) for m, i in zip(materials, images, strict=True))
     return replace(mesh, pictures=tuple(pictures))
-
-
-def image_of(material: bpy.types.Material) -> bpy.types.Image | None:
-    """The picture that gives ``material`` its colour: of those with colours the one nearest to its output; None: there is
-    none."""
-    tree = material.node_tree
-    if tree is None:
-        return None
-    outputs = [node for node in tree.nodes if node.type == "OUTPUT_MATERIAL"]
-    ahead, seen = deque(sorted(outputs, key=lambda node: not node.is_active_output)), set()
-    while ahead:
-        node = ahead.popleft()
-        if node in seen:
-            continue
-        seen.add(node)
-        image = node.image if node.type == "TEX_IMAGE" else None
-        if image is not None and image.colorspace_settings.name != "Non-Color":
-            return image
-        for socket in node.inputs:
-            ahead.extend(link.from_node for link in socket.links)
-    return None
 
 
 def pixels_of(image: bpy.types.Image) -> np.ndarray | None:
@@ -71,6 +51,24 @@ def pixels_of(image: bpy.types.Image) -> np.ndarray | None:
     finally:
         if scratch is not None:
             bpy.data.images.remove(scratch)
+
+
+def picture_beside(path: Path, name: str) -> np.ndarray | None:
+    """`pixels_of` the picture that the file at ``path`` calls ``name``, or of that of its name beside the file; None: there is
+    none, or none that can be read."""
+    relative = name.replace("\\", "/")  # written on Windows
+    for place in (path.parent / relative, path.parent / PurePosixPath(relative).name):
+        if not place.is_file():
+            continue
+        try:
+            image = bpy.data.images.load(str(place.resolve()))
+        except RuntimeError:
+            return None
+        try:
+            return pixels_of(image)
+        finally:
+            bpy.data.images.remove(image)
+    return None
 
 
 def _plain(material) -> np.ndarray | None:

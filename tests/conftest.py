@@ -4,6 +4,7 @@
 import os
 import shutil
 import signal
+import struct
 import sys
 import tempfile
 from pathlib import Path
@@ -188,6 +189,37 @@ def bad_scan(tmp_path):
         return path
 
     return make
+
+
+@pytest.fixture
+def write_rows():
+    """``write_rows(path, encoding, elements, comments)`` -> path of a PLY file.
+
+    elements : name -> (properties as the header says them, rows of numbers and of lists)
+    """
+
+    def write(path: Path, encoding: str, elements: dict, comments=("TextureFile skin.png",)) -> Path:
+        header, body = ["ply", f"format {encoding} 1.0", *(f"comment {line}" for line in comments)], b""
+        order = ">" if encoding == "binary_big_endian" else "<"
+        codes = {"uchar": "B", "int": "i", "float": "f", "double": "d"}
+        for name, (properties, rows) in elements.items():
+            header += [f"element {name} {len(rows)}", *(f"property {line}" for line in properties)]
+            for row in rows:
+                numbers = []
+                for line, value in zip(properties, row, strict=True):
+                    kinds = line.split()[:-1]
+                    if kinds[0] == "list":
+                        numbers += [(kinds[1], len(value)), *((kinds[2], each) for each in value)]
+                    else:
+                        numbers.append((kinds[0], value))
+                if encoding == "ascii":
+                    body += (" ".join(f"{value:.9g}" for _, value in numbers) + "\n").encode()
+                else:
+                    body += b"".join(struct.pack(order + codes[kind], value) for kind, value in numbers)
+        path.write_bytes(("\n".join(header) + "\nend_header\n").encode() + body)
+        return path
+
+    return write
 
 
 @pytest.fixture(scope="session")

@@ -89,6 +89,74 @@ def test_a_picture_of_an_unlit_material_comes_in_as_well(bpy, tmp_path, sheet):
     _check(scan, up=1)
 
 
+@pytest.fixture
+def ply(tmp_path, write_rows):
+    """``ply(name, number)`` -> path of `_sheet` as a PLY that shows the picture ``name``; ``number``: its
+    last faces show a second one."""
+
+    def make(name, number=False):
+        mesh = _sheet()
+        faces = (
+            np.concatenate([mesh.faces[:9, [0, 1, 2]], mesh.faces[:9, [0, 2, 3]]]).tolist() + mesh.faces[9:].tolist()
+        )
+        at = np.stack([mesh.vertices[:, 0] / 70, mesh.vertices[:, 2] / 60], axis=1)
+        rows = [[corners, at[corners].ravel().tolist(), int(k > 410)] for k, corners in enumerate(faces)]
+        properties = ["list uchar int vertex_indices", "list uchar float texcoord", "uchar texnumber"]
+        if not number:
+            properties, rows = properties[:2], [row[:2] for row in rows]
+        elements = {"vertex": (["float x", "float y", "float z"], mesh.vertices.tolist()), "face": (properties, rows)}
+        names = [name, "other.png"] if number else [name]
+        path = tmp_path / "scan.ply"
+        return write_rows(path, "binary_little_endian", elements, [f"TextureFile {each}" for each in names])
+
+    return make
+
+
+@pytest.mark.parametrize("name", ["skin.png", "C:\\scans\\export\\skin.png", "elsewhere/skin.png"])
+def test_a_picture_beside_a_ply_comes_in_with_it(bpy, sheet, ply, name):
+    from headshop.headshop_addon import scan_import
+
+    before = scan_import.datablocks()
+    scan = scan_import.read_scan(ply(name))
+    assert scan_import.datablocks() == before
+    assert [picture.shape for picture in scan.pictures] == [(HIGH, WIDE, 3)]
+    _check(scan, metres=False)
+
+
+def test_a_ply_shows_its_pictures_by_number(bpy, tmp_path, sheet, ply):
+    from headshop.headshop_addon import scan_import
+
+    image = bpy.data.images.new("other", 2, 2)
+    image.generated_color = 0, 0, 1, 1
+    image.filepath_raw, image.file_format = str(tmp_path / "other.png"), "PNG"
+    image.save()
+    scan = scan_import.read_scan(ply("skin.png", number=True))
+    assert len(scan.pictures) == 2
+    low, high = scan.vertices[:, 2] < 52, scan.vertices[:, 2] > 59
+    np.testing.assert_allclose(scan.colour[high], np.tile([0, 0, 1], (high.sum(), 1)), atol=0.01)
+    _check(Mesh(scan.vertices[low], scan.faces[:0], colour=scan.colour[low]), metres=False)
+    (tmp_path / "other.png").unlink()
+    scan = scan_import.read_scan(tmp_path / "scan.ply")
+    assert scan.pictures[1] is None and (scan.colour[high] == 1).all()
+
+
+@pytest.mark.parametrize("kind", ["gone", "a letter", "a folder", "cut off", "no name"])
+def test_a_ply_whose_picture_cannot_be_read_comes_in_without_colours(bpy, tmp_path, sheet, ply, kind):
+    from headshop.headshop_addon import scan_import
+
+    picture = tmp_path / "picture.png"
+    if kind == "a letter":
+        picture.write_bytes(b"Dear scanner, this is a letter.")
+    elif kind == "a folder":
+        picture.mkdir()
+    elif kind == "cut off":
+        picture.write_bytes((tmp_path / "skin.png").read_bytes()[:40])
+    before = scan_import.datablocks()
+    scan = scan_import.read_scan(ply("\0.png" if kind == "no name" else picture.name))
+    assert not has_pictures(scan) and scan.colour is None and len(scan.faces) > 400
+    assert scan_import.datablocks() == before
+
+
 def test_a_normal_map_is_no_colour(bpy, sheet):
     from headshop.headshop_addon import bridge, scan_texture
 

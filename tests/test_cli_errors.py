@@ -128,6 +128,13 @@ def test_a_truncated_scan(bpy, capfd, tmp_path, scan, landmarks):
     assert "truncated" in fails(capfd, tmp_path, *build(scan, landmarks(), tmp_path))
 
 
+def test_a_scan_with_too_few_places_on_its_picture(bpy, capfd, tmp_path, write_rows, landmarks):
+    faces = ["list uchar int vertex_indices", "list uchar float texcoord"], [([0, 1, 2], [0, 0, 1, 0])]
+    elements = {"vertex": (["float x", "float y", "float z"], [(0, 0, 0), (9, 0, 0), (0, 0, 9)]), "face": faces}
+    scan = write_rows(tmp_path / "textured.ply", "ascii", elements)
+    assert "more or fewer corners" in fails(capfd, tmp_path, *build(scan, landmarks(), tmp_path))
+
+
 def test_a_scan_of_one_triangle(bpy, capfd, tmp_path, scan, landmarks):
     write_ply(scan, Mesh.from_triangles([[0, 0, 0], [100, 0, 0], [0, 0, 100]], [[0, 1, 2]]))
     assert "1 triangle" in fails(capfd, tmp_path, *build(scan, landmarks(), tmp_path))

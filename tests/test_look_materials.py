@@ -124,6 +124,57 @@ def test_hair_does_not_stain_the_skin_below(reference):
     assert skinny[front].max(axis=1).min() > 0.2
 
 
+def test_what_is_not_trusted_gives_no_colour_and_does_not_hold_what_is_spread(reference):
+    """Red on the left; of the right, which is blue, one vertex in three is stained and not trusted."""
+    from headshop.headshop_addon.scan_colour import ScanColour, vertex_colour
+    from headshop.sim.mesh import vertex_normals
+
+    skin, source = reference.skin, ScanColour(_coloured_scan(reference))
+    normals = vertex_normals(skin.vertices, skin.triangles)
+    plain, sure = source.at(skin.vertices, normals)
+    stained = (np.arange(len(source.points)) % 3 == 0) & (source.points[:, 0] < 0)
+    source.colour = np.where(stained[:, None], (0.0, 0.9, 0.0), source.colour)
+    source.trust = np.where(stained, 0.0, 1.0)
+    colour, confidence = source.at(skin.vertices, normals)
+    np.testing.assert_allclose(colour[sure > 0, 1], 0.1 * (colour[sure > 0].sum(axis=1) > 0), atol=1e-6)
+    left = skin.vertices[:, 0] > 10
+    np.testing.assert_array_equal(colour[left], plain[left])
+    np.testing.assert_array_equal(confidence[left], sure[left])
+    assert confidence[(skin.vertices[:, 0] < -10) & (sure > 0.9)].min() < 0.05
+    spread, _ = vertex_colour(skin, source, reference.groups["inner"])
+    assert spread[:, 1].max() < 0.15
+    source.trust = np.where(source.points[:, 0] < 0, 0.4, 1.0)  # it is likelier something else
+    source.colour = np.where(source.points[:, :1] < 0, (0.0, 0.9, 0.0), source.colour)
+    spread, _ = vertex_colour(skin, source, reference.groups["inner"])
+    assert spread[skin.vertices[:, 0] < -10, 1].max() < 0.15
+
+
+def test_a_head_is_dressed_in_what_shows_skin(bpy, reference, monkeypatch):
+    from headshop.headshop_addon import bridge, heads, materials, scan_colour
+
+    monkeypatch.setattr(scan_colour, "SIZE", 96)
+    scan = bridge.mesh_to_object(_coloured_scan(reference), "Scan")
+    bpy.context.scene.collection.objects.link(scan)
+    heads.create_head(reference, "Ada", scan)
+    (skin,) = heads.find_heads()
+    bridge.write_attribute(skin.data, "hidden", reference.groups["scalp"] > 0.5)
+    asked = []
+
+    def shown(points, colour, mesh, groups, landmarks, eyes, hidden):
+        asked.append((len(mesh.vertices), len(groups["face"]), len(landmarks) > 50, len(eyes), int(hidden.sum())))
+        return (points[:, 0] < 0).astype(float)
+
+    monkeypatch.setattr(materials, "shown_skin", shown)
+    materials.dress_head(skin)
+    count = len(reference.skin.vertices)
+    assert asked == [(count, count, True, 2, int((reference.groups["scalp"] > 0.5).sum()))]
+    (image,) = [node.image for node in skin.data.materials[0].node_tree.nodes if node.type == "TEX_IMAGE"]
+    pixels = np.empty(len(image.pixels), dtype=np.float32)
+    image.pixels.foreach_get(pixels)
+    pixels = pixels.reshape(-1, 4)
+    assert (pixels[:, 0] > pixels[:, 2] + 0.2).mean() < 0.02  # red, which is on the left
+
+
 def test_a_speck_beside_the_skin_leaves_no_spot(reference):
     pytest.importorskip("bpy")
     from headshop.headshop_addon.scan_colour import ScanColour

@@ -3,6 +3,8 @@
 
 import numpy as np
 
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # of linear light
+
 
 def to_linear(srgb: np.ndarray) -> np.ndarray:
     """Linear light 0..1 of sRGB values 0..1."""

@@ -4,6 +4,7 @@
 Blender's importers read the artist's scans; this serves exports, tests and everyone without Blender.
 """
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,20 +12,35 @@ import numpy as np
 from ..anatomy.storage import write_atomically
 from ..errors import InputError
 from ..mesh import Mesh
-from .ply_header import Element, read_header
+from .ply_body import open_body
+from .ply_header import read_header
+from .ply_texture import corner_places
 
 FORMATS = ("binary_little_endian", "binary_big_endian", "ascii")
 _FACE_LISTS = ("vertex_indices", "vertex_index")
 
 
 def read_ply(path) -> Mesh:
-    """The mesh in a PLY file; polygons of more than four corners become fans of triangles.
+    """The mesh in a PLY file without its pictures; polygons of more than four corners become fans of triangles.
 
     Positions are returned as they stand in the file, in its own unit. ``colour`` is (n, 3) float32 in 0..1 or None.
 
     Raises
     ------
     InputError : the file is missing, empty, not PLY, truncated, without faces, or its counts or indices are absurd.
+    """
+    return replace(read_textured_ply(path)[0], uv=None, material=None)
+
+
+def read_textured_ply(path) -> tuple[Mesh, tuple[str, ...]]:
+    """`read_ply`, with the places of its faces on pictures, and the names of those as the file has them.
+
+    The mesh's ``material`` is an index into the names, or the number of them where a face shows none. It has neither that
+    nor ``uv`` where the file names no picture, or has no places on it.
+
+    Raises
+    ------
+    InputError : as `read_ply`, and for faces with places of other corners than theirs.
     """
     path = Path(path)
     try:
@@ -33,28 +49,30 @@ def read_ply(path) -> Mesh:
         raise InputError(
             f"{path} cannot be read ({error.strerror}): check the name and that you may read it."
         ) from error
-    encoding, elements, start = read_header(data, path)
-    reader = _AsciiBody(data[start:], path) if encoding == "ascii" else _BinaryBody(data, start, encoding, path)
-    mesh = {}
-    for element in elements:
-        columns = reader.element(element)
-        if element.name == "vertex":
-            mesh["vertices"], mesh["colour"] = _vertices(columns, path)
-        elif element.name == "face":
-            lists = [columns[name] for name in _FACE_LISTS if name in columns]
-            if lists:
-                mesh["faces"] = _faces(*lists[0])
-    if "vertices" not in mesh:
+    header = read_header(data, path)
+    body = open_body(data, header.start, header.encoding, path)
+    columns = {element.name: body.element(element) for element in header.elements}
+    if "vertex" not in columns:
         raise InputError(f"{path} has no vertices: export the scan again as a mesh.")
-    faces = mesh.get("faces")
-    if faces is None or not len(faces):
-        raise InputError(
-            f"{path} has {len(mesh['vertices'])} points but no faces: make a mesh of the points (the scanner's "
-            "software can) and export that."
-        )
-    if faces.min() < -1 or faces[:, :3].min() < 0 or faces.max() >= len(mesh["vertices"]):
+    of_vertices = {name: column for name, column in columns["vertex"].items() if not isinstance(column, tuple)}
+    vertices, colour = _vertices(of_vertices, path)
+    of_faces = columns.get("face", {})
+    lists = [of_faces[name] for name in _FACE_LISTS if isinstance(of_faces.get(name), tuple)]
+    if not lists or not len(lists[0][0]):
+        raise _no_faces(path, len(vertices))
+    counts, flat = lists[0]
+    corners, polygon = _corners(counts)
+    if not len(corners):
+        raise _no_faces(path, len(vertices))
+    named = np.append(np.clip(flat.astype(np.int64), -(2**31), 2**31 - 1), -1)  # the last is for the corner of none
+    faces = named[corners].astype(np.int32)
+    if faces.min() < -1 or named[corners[corners >= 0]].min() < 0 or faces.max() >= len(vertices):
         raise InputError(f"{path} is damaged, a face names a vertex that does not exist: export the scan again.")
-    return Mesh(mesh["vertices"], faces, colour=mesh["colour"])
+    mesh = Mesh(vertices, faces, colour=colour)
+    if not header.pictures:
+        return mesh, ()
+    uv, material = corner_places(of_vertices, of_faces, counts, corners, polygon, faces, len(header.pictures), path)
+    return replace(mesh, uv=uv, material=material), header.pictures
 
 
 def write_ply(path, mesh: Mesh, encoding: str = "binary_little_endian", comments: tuple[str, ...] = ()) -> None:
@@ -117,153 +135,21 @@ def _vertices(columns, path):
     return positions, None
 
 
-def _faces(counts: np.ndarray, flat: np.ndarray) -> np.ndarray:
-    """(m, 4) faces of polygons given as corner counts (p,) and all corners in a row."""
-    flat = flat.astype(np.int64)
+def _corners(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(m, 4) which of all corners in a row are those of the faces that polygons with ``counts`` (p,) corners become, -1 for the
+    fourth of a triangle; and (m,) the polygon of each face."""
     start = np.cumsum(counts) - counts
-    small = (counts == 3) | (counts == 4)
-    out = np.full((int(small.sum()), 4), -1, dtype=np.int64)
-    for k in range(4):
-        has = counts[small] > k
-        out[has, k] = flat[start[small][has] + k]
+    small = np.flatnonzero((counts == 3) | (counts == 4))
+    out = start[small, None] + np.arange(4)
+    out[counts[small] == 3, 3] = -1
     big = counts > 4
-    if big.any():
-        fans = np.repeat(np.flatnonzero(big), counts[big] - 2)
-        step = np.arange(len(fans)) - np.repeat(np.cumsum(counts[big] - 2) - (counts[big] - 2), counts[big] - 2)
-        fan = np.full((len(fans), 4), -1, dtype=np.int64)
-        for k, offset in enumerate((0, step + 1, step + 2)):
-            fan[:, k] = flat[start[fans] + offset]
-        out = np.concatenate([out, fan])
-    return np.clip(out, -(2**31), 2**31 - 1).astype(np.int32)
+    fans = np.repeat(np.flatnonzero(big), counts[big] - 2)
+    step = np.arange(len(fans)) - np.repeat(np.cumsum(counts[big] - 2) - (counts[big] - 2), counts[big] - 2)
+    fan = np.stack([start[fans], start[fans] + step + 1, start[fans] + step + 2, np.full(len(fans), -1)], axis=1)
+    return np.concatenate([out, fan]), np.concatenate([small, fans])
 
 
-class _BinaryBody:
-    """Elements read one after the other from a binary body."""
-
-    def __init__(self, data: bytes, start: int, encoding: str, path):
-        self.data, self.at, self.path = data, start, path
-        self.order = "<" if encoding == "binary_little_endian" else ">"
-
-    def element(self, element: Element) -> dict:
-        if not element.count:
-            return {p.name: (np.zeros(0, int), np.zeros(0, int)) if p.count_type else [] for p in element.properties}
-        lengths = self._first_lengths(element)
-        columns = self._uniform(element, lengths)
-        return columns if columns is not None else self._ragged(element)
-
-    def _need(self, size: int) -> None:
-        if self.at + size > len(self.data):
-            raise _truncated(self.path)
-
-    def _first_lengths(self, element) -> dict[str, int]:
-        """List lengths of the first row: nearly every file has the same in all rows."""
-        at, lengths = self.at, {}
-        for p in element.properties:
-            if p.count_type:
-                width = np.dtype(p.count_type).itemsize
-                if at + width > len(self.data):
-                    raise _truncated(self.path)
-                lengths[p.name] = int(np.frombuffer(self.data, self.order + p.count_type, 1, at)[0])
-                at += width + max(lengths[p.name], 0) * np.dtype(p.type).itemsize
-            else:
-                at += np.dtype(p.type).itemsize
-        return lengths
-
-    def _uniform(self, element, lengths):
-        """All rows at once if their lists are equally long, else None."""
-        fields = []
-        for p in element.properties:
-            if p.count_type:
-                if not 0 <= lengths[p.name] < 10_000:
-                    return None
-                fields.append((p.name + " length", self.order + p.count_type))
-            shape = (lengths[p.name],) if p.count_type else ()
-            fields.append((p.name, self.order + p.type, shape))
-        row = np.dtype(fields)
-        if self.at + row.itemsize * element.count > len(self.data):
-            if not lengths:
-                raise _truncated(self.path)
-            return None
-        table = np.frombuffer(self.data, row, element.count, self.at)
-        if any((table[name + " length"] != length).any() for name, length in lengths.items()):
-            return None
-        self.at += row.itemsize * element.count
-        return {
-            p.name: (np.full(element.count, lengths[p.name]), table[p.name].ravel()) if p.count_type else table[p.name]
-            for p in element.properties
-        }
-
-    def _ragged(self, element):
-        """Row by row: where a row starts depends on all lists before it."""
-        counts = {p.name: [] for p in element.properties if p.count_type}
-        pieces = {p.name: [] for p in element.properties}
-        for _ in range(element.count):
-            for p in element.properties:
-                length, width = 1, np.dtype(p.type).itemsize
-                if p.count_type:
-                    wide = np.dtype(p.count_type).itemsize
-                    self._need(wide)
-                    order = "little" if self.order == "<" else "big"
-                    length = int.from_bytes(self.data[self.at : self.at + wide], order)
-                    counts[p.name].append(length)
-                    self.at += wide
-                self._need(length * width)
-                pieces[p.name].append(self.data[self.at : self.at + length * width])
-                self.at += length * width
-        columns = {}
-        for p in element.properties:
-            values = np.frombuffer(b"".join(pieces[p.name]), self.order + p.type)
-            columns[p.name] = (np.array(counts[p.name], dtype=np.int64), values) if p.count_type else values
-        return columns
-
-
-class _AsciiBody:
-    """Elements read one after the other from the numbers of an ASCII body."""
-
-    def __init__(self, body: bytes, path):
-        self.path, self.at = path, 0
-        try:
-            self.numbers = np.array(body.split(), dtype=np.float64)
-        except ValueError as error:
-            raise InputError(
-                f"{path} is damaged, there is something that is no number in it: export the scan again."
-            ) from error
-
-    def element(self, element: Element) -> dict:
-        lists = [p for p in element.properties if p.count_type]
-        if not element.count:
-            return {p.name: (np.zeros(0, int), np.zeros(0, int)) if p.count_type else [] for p in element.properties}
-        if not lists:
-            table = self._take(element.count * len(element.properties)).reshape(element.count, -1)
-            return {p.name: table[:, k].astype(p.type) for k, p in enumerate(element.properties)}
-        if len(element.properties) == 1 and self.at < len(self.numbers):  # one list a row, often equally long
-            width = int(self.numbers[self.at]) + 1
-            if width > 0 and self.at + width * element.count <= len(self.numbers):
-                table = self.numbers[self.at : self.at + width * element.count].reshape(element.count, width)
-                if (table[:, 0] == width - 1).all():
-                    self.at += width * element.count
-                    return {lists[0].name: (table[:, 0].astype(np.int64), table[:, 1:].ravel())}
-        counts, pieces = {p.name: [] for p in lists}, {p.name: [] for p in element.properties}
-        for _ in range(element.count):
-            for p in element.properties:
-                length = 1
-                if p.count_type:
-                    length = max(int(self._take(1)[0]), 0)
-                    counts[p.name].append(length)
-                pieces[p.name].append(self._take(length))
-        return {
-            p.name: (np.array(counts[p.name], dtype=np.int64), np.concatenate(pieces[p.name]))
-            if p.count_type
-            else np.concatenate(pieces[p.name]).astype(p.type)
-            for p in element.properties
-        }
-
-    def _take(self, count: int) -> np.ndarray:
-        if self.at + count > len(self.numbers):
-            raise _truncated(self.path)
-        self.at += count
-        return self.numbers[self.at - count : self.at]
-
-
-def _truncated(path) -> InputError:
-    return InputError(f"{path} is truncated, its end is missing: copy or export it again.")
+def _no_faces(path, points: int) -> InputError:
+    return InputError(
+        f"{path} has {points} points but no faces: make a mesh of the points (the scanner's software can) and export that."
+    )

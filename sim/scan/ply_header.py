@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The header of a PLY file: which elements follow, with which properties."""
+"""The header of a PLY file: which elements follow, with which properties, and which pictures it names."""
 
+import re
 from dataclasses import dataclass, field
 
 from ..errors import InputError
@@ -36,8 +37,18 @@ class Element:
         return max(1, len(self.properties))
 
 
-def read_header(data: bytes, path) -> tuple[str, list[Element], int]:
-    """Encoding, elements and the offset of the body.
+@dataclass(frozen=True)
+class Header:
+    """``encoding`` and ``elements`` of a file, the names of its ``pictures``, and ``start``, the offset of the body."""
+
+    encoding: str
+    elements: list[Element]
+    pictures: tuple[str, ...]
+    start: int
+
+
+def read_header(data: bytes, path) -> Header:
+    """What the header says; a picture is what ``comment TextureFile NAME`` names, as MeshLab, Metashape and others write it.
 
     Raises
     ------
@@ -52,14 +63,17 @@ def read_header(data: bytes, path) -> tuple[str, list[Element], int]:
         raise InputError(f"{path} is truncated within its header: copy or export it again.")
     start = mark + len(b"end_header")
     start += 2 if data[start : start + 2] == b"\r\n" else 1
-    encoding, elements = None, []
-    for line in data[:mark].decode("latin-1").splitlines():
+    encoding, elements, pictures = None, [], []
+    # not `str.splitlines`: bytes of a name in UTF-8 may look like further ends of lines
+    for line in re.split(r"[\r\n]+", data[:mark].decode("latin-1")):
         words = line.split()
         try:
             if not words:
                 continue
             if words[0] == "format":
                 encoding = words[1]
+            elif [word.lower() for word in words[:2]] == ["comment", "texturefile"] and len(words) > 2:
+                pictures.append(_name(line.split(maxsplit=2)[2]))
             elif words[0] == "element":
                 elements.append(Element(words[1], int(words[2])))
             elif words[0] == "property" and words[1] == "list":
@@ -79,4 +93,12 @@ def read_header(data: bytes, path) -> tuple[str, list[Element], int]:
                 f"{path} promises {element.count} of '{element.name}' but is only {len(data)} bytes long: it is "
                 "damaged or truncated, copy or export it again."
             )
-    return encoding, elements, start
+    return Header(encoding, elements, tuple(pictures), start)
+
+
+def _name(latin: str) -> str:
+    """A name as it is meant: in UTF-8, or else in Latin-1 as it was read."""
+    try:
+        return latin.strip().encode("latin-1").decode("utf-8")
+    except UnicodeDecodeError:
+        return latin.strip()
