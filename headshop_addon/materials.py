@@ -42,7 +42,7 @@ def dressing(skin: bpy.types.Object) -> Work:
     head = heads.read_head(skin)
     axes = head_axes(head)
     scan = _coloured_scan(skin)
-    seen = None if scan is None else ScanColour(scan, head.parts["skin"].vertices)
+    seen = None if scan is None else ScanColour(scan, head.parts["skin"].vertices).turned_to(head.parts["skin"])
     iris = None if seen is None else iris_colour(seen.scan, head.eyes)
     hidden = bridge.read_attribute(skin.data, "hidden")
     if seen is not None:

@@ -15,6 +15,7 @@ from ..sim.progress import Progress, Work
 from ..sim.scan.colour_space import LUMINANCE, to_linear, to_srgb
 from ..sim.scan.specks import specks
 from ..sim.scan.texture import has_pictures, strewn, texel_size
+from ..sim.scan.winding import faces_away
 from .scan_texture import fill
 from .skin_paint import adjacency, smoothed, spread
 
@@ -53,6 +54,13 @@ class ScanColour:
         self.tree = cKDTree(points)
         some = points[:: max(len(points) // 2000, 1)]
         self.spacing = float(np.median(self.tree.query(some, k=2)[0][:, 1]))
+
+    def turned_to(self, skin: Mesh) -> "ScanColour":
+        """Itself, its normals out if the scan is wound inside out beside the ``skin``: what faces away would not count."""
+        facing = vertex_normals(skin.vertices, skin.triangles)
+        if faces_away(self.points, self.normals, skin.vertices, facing, self.spacing + FAR):
+            self.normals = -self.normals
+        return self
 
     def at(self, points: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Linear colours (k, 3) and confidences (k,) 0..1 at points (k, 3) mm of a surface with normals (k, 3)."""

@@ -7,10 +7,14 @@ import bmesh
 import bpy
 import numpy as np
 
+from ..sim.mesh import vertex_normals
+from ..sim.scan.winding import faces_away
 from . import heads
 from .anatomy_materials import anatomy_material, scan_material
-from .bridge import read_positions, write_positions
+from .bridge import METRES, object_to_mesh, read_positions, write_positions
 from .stage import Portrait, set_stage
+
+BESIDE = 5.0  # mm from the skin to what a scan shows of it
 
 
 @contextmanager
@@ -58,7 +62,7 @@ class Model:
             self._add(scene, "muscles", obj)
         self.scan = heads.scan_of(skin)
         if self.scan is not None:
-            _dress_scan(self._add(scene, "scan", self.scan))
+            _dress_scan(self._add(scene, "scan", self.scan), self._parts["skin"])
         (whole,) = self.sets["skin"].objects
         half = self._add(scene, "half", skin)
         _cut(half, whole.matrix_world.inverted(), frame)
@@ -116,14 +120,25 @@ def _cut(obj: bpy.types.Object, to_local, frame: Portrait) -> None:
     cut.free()
 
 
+def _in_world(obj):
+    """(n, 3) mm and unit normals (n, 3) of the vertices of ``obj``, as it is drawn: one that is mirrored is not turned."""
+    mesh, matrix = object_to_mesh(obj), np.array(obj.matrix_world)
+    vertices = mesh.vertices @ matrix[:3, :3].T + matrix[:3, 3] / METRES
+    return vertices, vertex_normals(vertices, mesh.triangles) * np.sign(np.linalg.det(matrix[:3, :3]))
+
+
 def _vector(values):
     from mathutils import Vector
 
     return Vector(values)
 
 
-def _dress_scan(copy: bpy.types.Object) -> None:
-    """Show the scan's own colours, or grey clay if it has neither colours nor a material."""
+def _dress_scan(copy: bpy.types.Object, skin: bpy.types.Object) -> None:
+    """Show the outside of a scan, also of one that is wound inside out, in its own colours, or grey clay if it has neither
+    colours nor a material."""
+    (seen, out), (there, facing) = (_in_world(obj) for obj in (copy, skin))
+    if faces_away(seen, out, there, facing, BESIDE):
+        copy.data.flip_normals()
     materials = copy.data.materials
     if any(material is not None for material in materials):
         return

@@ -205,6 +205,49 @@ def test_a_scan_elsewhere_gives_no_colour(reference):
     assert vertex_colour(reference.skin, ScanColour(far), reference.groups["inner"]) is None
 
 
+def test_a_scan_wound_inside_out_gives_the_same_colours(bpy, reference, monkeypatch):
+    from headshop.headshop_addon import bridge, heads, materials, scan_colour
+    from headshop.sim.mesh import Mesh
+
+    monkeypatch.setattr(scan_colour, "SIZE", 96)
+    scan = _coloured_scan(reference)
+    found = []
+    for name, triangles in (("Ada", scan.triangles), ("Bea", scan.triangles[:, ::-1])):
+        mesh = Mesh.from_triangles(scan.vertices, triangles, colour=scan.colour)
+        obj = bridge.mesh_to_object(mesh, name + " Scan")
+        bpy.context.scene.collection.objects.link(obj)
+        heads.create_head(reference, name, obj)
+        (skin,) = (head for head in heads.find_heads() if head.name.startswith(name))
+        materials.dress_head(skin)
+        nodes = skin.data.materials[0].node_tree.nodes
+        (image,) = (node.image for node in nodes if node.type == "TEX_IMAGE")
+        found.append(np.array(image.pixels[:]))
+    np.testing.assert_allclose(*found, atol=0.02)
+
+
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_a_scan_wound_inside_out_is_shown_outside_out(bpy, skin, reference, mirrored):
+    """The inside of a scan is drawn dark."""
+    from headshop.headshop_addon import bridge, heads
+    from headshop.headshop_addon.studio import Model, studio
+    from headshop.sim.mesh import Mesh
+
+    scan, outward = reference.skin, []
+    for triangles in (scan.triangles, scan.triangles[:, ::-1]):
+        flip = [-1.0, 1.0, 1.0] if mirrored else [1.0, 1.0, 1.0]
+        obj = bridge.mesh_to_object(Mesh.from_triangles(scan.vertices * flip, triangles), "Scan")
+        obj.scale = flip
+        bpy.context.scene.collection.objects.link(obj)
+        skin[heads.SCAN] = obj
+        with studio(skin) as (scene, frame):
+            Model(scene, skin, frame)
+            (copy,) = bpy.data.collections["Head Shop Studio scan"].objects
+            normals = np.array([v.normal[:] for v in copy.data.vertices])
+            outward.append(normals)
+        bpy.data.objects.remove(obj)
+    np.testing.assert_allclose(*outward, atol=1e-3)
+
+
 def test_a_coloured_scan_gives_the_head_a_skin_of_its_own(bpy, reference, monkeypatch):
     from headshop.headshop_addon import bridge, heads, materials, scan_colour
 

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Triangles wound the same way round as their neighbours: exporters and merged scans turn some of them."""
+"""Triangles wound the same way round as their neighbours, and outside out: exporters turn some of them, or all."""
 
 import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 
 def wound_alike(triangles: np.ndarray, vertex_count: int) -> np.ndarray:
@@ -25,6 +26,14 @@ def wound_alike(triangles: np.ndarray, vertex_count: int) -> np.ndarray:
     piece, second = np.minimum(as_is, over), as_is > over
     one_way, other_way = (np.bincount(piece[some], minlength=2 * m) for some in (~second, second))
     return (as_is != over) & (second == (other_way < one_way)[piece])
+
+
+def faces_away(points, normals, skin, facing, reach: float) -> bool:
+    """Whether a scan is wound inside out: most of its ``points`` (n, 3) mm that are nearest to points of a ``skin`` (k, 3), no
+    farther than ``reach``, have ``normals`` (n, 3) against the skin's, ``facing`` (k, 3)."""
+    distance, nearest = cKDTree(points).query(skin, distance_upper_bound=reach)
+    near = np.isfinite(distance)
+    return bool(np.einsum("ij,ij->i", normals[nearest[near]], facing[near]).sum() < 0)
 
 
 def _neighbours(triangles, n):
