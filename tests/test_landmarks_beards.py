@@ -89,13 +89,13 @@ def test_a_chin_is_invented_below_a_beard(reference, space, bearded, chin):
 
 def test_landmarks_picked_on_a_chin_below_a_beard_tell_where_it_is(reference, bearded):
     target, _, marks, _ = bearded(*WORN)
-    chin = {n: marks[n] for n in ("sl", "pg", "gn")}
-    at = {n: p + moved(n) for n, p in chin.items()}
+    farther = {n: marks[n] + [0.0, -6.0, 0.0] for n in ("sl", "pg", "gn")}
+    picks = {n: p + moved(n) for n, p in farther.items()}
     off = []
-    for given, found in (({}, ()), (at, ()), ({n: p + [0, 9, 0] for n, p in at.items()}, tuple(at))):
+    for given, found in (({}, ()), (picks, ()), (picks, tuple(picks))):
         look = finish(first_look(reference, target, _given(marks) | given, ["beard"], found))
-        off.append(np.abs(look.filled.closest(np.array([chin["pg"], chin["gn"]])).distance).mean())
-    assert off[1] < 0.7 and off[0] > 2 * off[1] and off[2] == pytest.approx(off[0], abs=0.3)
+        off.append(look.filled.closest(farther["pg"][None]).distance[0])
+    assert off[1] < 2.0 and off[0] > 2 * off[1] and off[2] == pytest.approx(off[0], abs=0.5), off
 
 
 def test_whoever_wants_to_keep_it_does(reference, bearded):

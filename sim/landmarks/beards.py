@@ -22,6 +22,7 @@ BESIDE, STEEP, UNDER_EAR, BEHIND, UNDER_CHIN, ROUND_LIPS = 22.0, 0.75, 5.0, 2.0,
 AWAY = 0.05  # of `ShapeSpace.ear`, from which on skin is an ear
 #: rad by which normals vary, and mm off the head, from which on it may be beard; mm to which it is what lies beside that.
 ROUGH, HIGH, ABOUT = 0.2, 2.0, 8.0
+BEYOND = 12.0  # mm beside where beards grow, on the cheeks, that one which grows there may reach
 #: mm to which a beard may stand off, and from which on what stands off the throat is one that hangs there.
 REACH, HANGING = 90.0, 6.0
 #: Share of the chin that is so `HIGH` under a beard: of 17, .31 to .86; of a goatee .20, a moustache .08. And of a thick one,
@@ -82,7 +83,10 @@ def rough_chin(space: ShapeSpace, fit: ShapeFit, target: Surface) -> tuple[bool,
 def thick_beard(space: ShapeSpace, above: ShapeFit, target: Surface) -> Beard:
     """The `Beard` of the scan ``target``, if it has one, as the face laid on it without regard to one tells, ``above``."""
     zone, marks = grows_beard(space), space.landmarks(space.points)
-    high, rough = heights(space, above, target)
+    beyond = cKDTree(space.points[zone]).query(space.points)[0] < BEYOND
+    beyond &= (np.abs(space.points[:, 0]) > BESIDE + BEYOND) & (space.ear < AWAY)
+    zone = zone | (beyond & ~lips_beside(space) & (space.points[:, 2] < marks["en_l"][2] - BEYOND))
+    high, rough = heights(space, above, target, zone)
     some = zone & ((high > HIGH) | (rough > ROUGH))
     if some.any():
         some = zone & (cKDTree(space.points[some]).query(space.points)[0] < ABOUT)
@@ -91,10 +95,11 @@ def thick_beard(space: ShapeSpace, above: ShapeFit, target: Surface) -> Beard:
     return Beard(above, some, zone | throat)
 
 
-def heights(space: ShapeSpace, fit: ShapeFit, target: Surface):
-    """(n,) mm, on a head of the reference's size, by which the scan ``target`` stands off the skin laid on it where beards
-    grow, and (n,) rad by which it is rough there, each about every point of the skin; 0 elsewhere."""
-    zone, size, coarse = grows_beard(space), fit.pose.scale, target.coarser()
+def heights(space: ShapeSpace, fit: ShapeFit, target: Surface, zone=None):
+    """(n,) mm, on a head of the reference's size, by which the scan ``target`` stands off the skin laid on it in a ``zone``
+    (n,) bool (None: where beards grow), and (n,) rad by which it is rough, each about every point there; 0 elsewhere."""
+    zone = grows_beard(space) if zone is None else zone
+    size, coarse = fit.pose.scale, target.coarser()
     middle, near, off, high = over(fit, space, coarse, slice(None, None, max(len(coarse.triangles) // MANY, 1)))
     some = (near >= 0) & ((off**2).sum(axis=1) < 2.0) & zone[near]
     middle, near, off, high = middle[some], near[some], off[some], high[some] / size
