@@ -25,7 +25,7 @@ NEARER = 0.78
 #: How bad a face is against what it was, if it had lain amiss: two under caps .45 and .63, others .86 and more.
 BETTER = 0.75
 #: How much nearer to the scan the lips of a face with a rough chin lie without regard to a beard, and then on the scan beside
-#: it: of 14 beards .31 to .70 and .32 to .91, of a moustache .52 and .78, of a goatee .68 and .99; of noisy scans, caps and
+#: it: of 14 beards .31 to .70 and .31 to .90, of a moustache .52 and .76, of a goatee .68 and .97; of noisy scans, caps and
 #: collars .71 and 1.05 and more. Of two thick beards, in whose furrows lips lay as near, .59 and .70, .94 and 1.03.
 ABOVE, BESIDE, FURROW = 0.75, 0.95, 0.9
 

@@ -25,8 +25,8 @@ ROUGH, HIGH, ABOUT = 0.2, 2.0, 8.0
 BEYOND = 12.0  # mm beside where beards grow, on the cheeks, that one which grows there may reach
 #: mm to which a beard may stand off, and from which on what stands off the throat is one that hangs there.
 REACH, HANGING = 90.0, 6.0
-#: Share of the chin that is so `HIGH` under a beard: of 17, .31 to .86; of a goatee .20, a moustache .08. And of a thick one,
-#: .68 and more; a hand on a cheek came to .31.
+#: Share of the chin that is so `HIGH` under a beard: of 17, .30 to .85; of a goatee .24, a moustache .08. And of a thick one,
+#: .66 and more; a hand on a cheek came to .34.
 SHARE, THICK = 0.25, 0.5
 OVER_SKIN = 60.0  # mm behind a beard to which skin is hidden by it
 #: Share of the chin that is rough where a beard may be: of those, .71 and more; of smooth scans of 16 faces .24 at most, of
