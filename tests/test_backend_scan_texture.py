@@ -112,7 +112,7 @@ def ply(tmp_path, write_rows):
     return make
 
 
-@pytest.mark.parametrize("name", ["skin.png", "C:\\scans\\export\\skin.png", "elsewhere/skin.png"])
+@pytest.mark.parametrize("name", ["skin.png", "C:\\scans\\export\\skin.png", "elsewhere/skin.png", "maps/../skin.png"])
 def test_a_picture_beside_a_ply_comes_in_with_it(bpy, sheet, ply, name):
     from headshop.headshop_addon import scan_import
 
@@ -140,7 +140,7 @@ def test_a_ply_shows_its_pictures_by_number(bpy, tmp_path, sheet, ply):
     assert scan.pictures[1] is None and (scan.colour[high] == 1).all()
 
 
-@pytest.mark.parametrize("kind", ["gone", "a letter", "a folder", "cut off", "no name"])
+@pytest.mark.parametrize("kind", ["gone", "a letter", "a folder", "cut off", "no name", "a long name"])
 def test_a_ply_whose_picture_cannot_be_read_comes_in_without_colours(bpy, tmp_path, sheet, ply, kind):
     from headshop.headshop_addon import scan_import
 
@@ -152,7 +152,7 @@ def test_a_ply_whose_picture_cannot_be_read_comes_in_without_colours(bpy, tmp_pa
     elif kind == "cut off":
         picture.write_bytes((tmp_path / "skin.png").read_bytes()[:40])
     before = scan_import.datablocks()
-    scan = scan_import.read_scan(ply("\0.png" if kind == "no name" else picture.name))
+    scan = scan_import.read_scan(ply({"no name": "\0.png", "a long name": "a" * 300}.get(kind, picture.name)))
     assert not has_pictures(scan) and scan.colour is None and len(scan.faces) > 400
     assert scan_import.datablocks() == before
 

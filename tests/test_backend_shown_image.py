@@ -196,6 +196,12 @@ def test_pictures_within_groups(made):
     group = made.group(inner)
     assert made.shown(made.node("Emission", {"Color": group.outputs["Made"]})) == "skin"
     assert made.shown(made.node("Emission", {"Color": group.outputs["Mask"]})) is None
+    nodes = group.node_tree.nodes
+    nodes.active = unused = nodes.new("NodeGroupOutput")  # the group puts out what the other one gets
+    next(node for node in nodes if node.type == "GROUP_OUTPUT" and node != unused).is_active_output = True
+    group.node_tree.links.new(nodes.new("ShaderNodeTexImage").outputs[0], unused.inputs["Made"])
+    unused.inputs["Made"].links[0].from_node.image = made.other
+    assert made.shown(made.node("Emission", {"Color": group.outputs["Made"]})) == "skin"
     colour = made.node("Emission", {"Color": group.outputs["Made"]})
     group.node_tree = None
     assert made.shown(colour) is None
@@ -208,6 +214,14 @@ def test_muted_nodes_pass_through_and_muted_pictures_are_none(made):
     colour.node.mute = True
     assert made.shown(shader) == "skin"
     first.node.mute = True
+    assert made.shown(shader) is None
+
+
+def test_links_that_are_muted_pass_nothing_on(made):
+    shader = made.node("BsdfPrincipled", {"Base Color": made.picture(made.skin)})
+    assert made.shown(shader) == "skin"
+    (link,) = shader.node.inputs["Base Color"].links
+    link.is_muted = True
     assert made.shown(shader) is None
 
 

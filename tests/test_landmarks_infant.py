@@ -179,6 +179,10 @@ def test_an_odd_face_may_be_an_infants(reference, space, monkeypatch, bad, asked
     monkeypatch.setattr(placed_face, "share_of", lambda *_: 1.0)
     _, fit, _, of = finish(placed_face.place_face(reference.skin, reference, space, (1.0,)))
     assert (fit, of.of_infants) == (("infant", True) if asked else ("grown", False))
+    monkeypatch.setattr(placed_face, "LOOKS", LOOKS[-1:])  # above a beard, which no infant has
+    monkeypatch.setattr(placed_face, "PARTS", PARTS[-1:])
+    _, fit, _, of = finish(placed_face.place_face(reference.skin, reference, space, (1.0,)))
+    assert (fit, of.of_infants) == ("grown", False) and not of.area.all()
 
 
 def _child(reference, seed, size, low):
