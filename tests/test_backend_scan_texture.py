@@ -245,6 +245,16 @@ def test_a_head_is_dressed_in_the_pictures_of_its_scan(bpy, reference, monkeypat
     assert has_pictures(asked[0])
 
 
+def test_a_scan_with_a_picture_that_lies_elsewhere_colours_nothing(reference):
+    """As one that was dragged aside to compare it."""
+    from headshop.headshop_addon.scan_colour import ScanColour, vertex_colour
+
+    scan = replace(_sheet(), vertices=_sheet().vertices + [900.0, 0, 0], colour=vertex_colours(_sheet()))
+    seen = ScanColour(scan, reference.skin.vertices)
+    assert len(seen.points) == len(scan.vertices) == len(seen.trust)
+    assert vertex_colour(reference.skin, seen, reference.groups["inner"]) is None
+
+
 def test_skin_shows_what_a_picture_shows_between_the_vertices_of_a_scan():
     """A line 1.5 mm wide on triangles of 20 mm, none of whose vertices lies on it."""
     from headshop.headshop_addon.scan_colour import LARGE, SIZE, ScanColour

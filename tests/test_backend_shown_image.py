@@ -246,8 +246,9 @@ def test_links_in_a_circle_come_to_an_end(made):
 
 def test_an_adopted_object_shows_what_its_group_does(made):
     """Up to the colours of the mesh."""
-    from headshop.headshop_addon import bridge, scan_import, scan_texture
+    from headshop.headshop_addon import bridge, scan_texture
     from headshop.sim.mesh import Mesh
+    from headshop.sim.scan.joined import joined
 
     def glowing(graph, tint):
         return graph.node("Emission", {0: graph.node("TexImage", image=made.skin).outputs[0]}).outputs[0]
@@ -258,5 +259,5 @@ def test_an_adopted_object_shows_what_its_group_does(made):
     uv = np.zeros((1, 4, 2), np.float32) + 0.5
     obj = bridge.mesh_to_object(Mesh(points, np.array([[0, 1, 2, -1]], np.int32), uv=uv), "scan")
     obj.data.materials.append(made.material)
-    scan = scan_import.joined([scan_texture.with_pictures(bridge.object_to_mesh(obj), obj)])
+    scan = joined([scan_texture.with_pictures(bridge.object_to_mesh(obj), obj)])
     np.testing.assert_allclose(scan.colour, [[0, 1, 0]] * 3, atol=1e-6)
