@@ -135,8 +135,11 @@ def test_a_ply_shows_its_pictures_by_number(bpy, tmp_path, sheet, ply):
     low, high = scan.vertices[:, 2] < 52, scan.vertices[:, 2] > 59
     np.testing.assert_allclose(scan.colour[high], np.tile([0, 0, 1], (high.sum(), 1)), atol=0.01)
     _check(Mesh(scan.vertices[low], scan.faces[:0], colour=scan.colour[low]), metres=False)
+    path = tmp_path / "scan.ply"
+    path.write_bytes(path.read_bytes().replace(b"comment TextureFile other.png\n", b""))
+    assert scan_import.read_scan(path).pictures[1:] == (None,)  # for the faces of a picture that is not named
     (tmp_path / "other.png").unlink()
-    scan = scan_import.read_scan(tmp_path / "scan.ply")
+    scan = scan_import.read_scan(ply("skin.png", number=True))
     assert scan.pictures[1] is None and (scan.colour[high] == 1).all()
 
 

@@ -7,7 +7,16 @@ import pytest
 from headshop.sim.adapt.scan_surface import NO_SKIN
 from headshop.sim.anatomy.landmark_names import SKIN
 from headshop.sim.landmarks import looks, placed_face
-from headshop.sim.landmarks.beards import above_beard, beard_over, grows_beard, heights, lips_beside, thick_beard
+from headshop.sim.landmarks.beards import (
+    HANGING,
+    UNDER_CHIN,
+    above_beard,
+    beard_over,
+    grows_beard,
+    heights,
+    lips_beside,
+    thick_beard,
+)
 from headshop.sim.landmarks.find import find_landmarks
 from headshop.sim.landmarks.first_look import first_look
 from headshop.sim.landmarks.picked import moved
@@ -69,11 +78,15 @@ def test_a_beard_is_left_out_and_the_lips_are_not(space, bearded, laid, chin):
 
 
 def test_what_hangs_before_the_throat_is_left_out_too(space, bearded, laid):
-    target, points, marks, _ = bearded(*WORN)
-    sheet = marks["gn"] + [[-15, -5, -5], [15, -5, -5], [15, -5, -50], [-15, -5, -50]]
-    longer = target.beside(sheet, np.array([[0, 2, 1], [0, 3, 2]]))
+    target, points, _, _ = bearded(*WORN)
+    throat = space.points[:, 2] < space.landmarks(space.points)["gn"][2] - UNDER_CHIN - 8  # below where beards grow
+    throat &= np.abs(space.points[:, 0]) < 1
+    skin = points[throat][points[throat][:, 2].argmax()]
+    sheet = np.array([[-4, 0, 2], [4, 0, 2], [4, 0, -2], [-4, 0, -2]])
+    off = [skin - [0, HANGING + far, 0] + sheet for far in (4, -4)]  # the second as near as a collar
+    longer = target.beside(np.concatenate(off), np.array([[0, 2, 1], [0, 3, 2], [4, 6, 5], [4, 7, 6]]))
     beard = thick_beard(space, laid(space, points), longer)
-    assert beard_over(space, beard, longer)[-2:].all()
+    assert beard_over(space, beard, longer)[-4:].tolist() == [True, True, False, False]
 
 
 def test_a_chin_is_invented_below_a_beard(reference, space, bearded, chin):
@@ -96,6 +109,19 @@ def test_landmarks_picked_on_a_chin_below_a_beard_tell_where_it_is(reference, be
         look = finish(first_look(reference, target, _given(marks) | given, ["beard"], found))
         off.append(np.abs(look.filled.closest(np.array([chin["pg"], chin["gn"]])).distance).mean())
     assert off[1] < 0.7 and off[0] > 2 * off[1] and off[2] == pytest.approx(off[0], abs=0.3)
+
+
+def test_landmarks_picked_on_a_beard_do_not_pull_the_chin_out_to_it(reference, space, bearded):
+    """Where whoever clicks on what is to be seen has them."""
+    target, points, marks, _ = bearded(*WORN)
+    rows = [space.names.index(name) for name in ("sl", "pg", "gn", "go_l", "go_r")]
+    seen = np.einsum("kij,ki->kj", target.vertices[space.corners[rows]], space.weights[rows])
+    on = {space.names[row]: place for row, place in zip(rows, seen, strict=True)}
+    assert min(np.linalg.norm(on[name] - marks[name]) for name in ("pg", "gn")) > 9
+    look = finish(first_look(reference, target, _given(marks) | on, ["beard"]))
+    assert not {"pg", "gn"} & set(look.landmarks) and set(_given(marks)) <= set(look.landmarks)
+    for name in ("pg", "gn"):
+        assert np.linalg.norm(look.guessed[name] - marks[name]) < 6 < look.filled.closest(on[name]).distance[0]
 
 
 def test_whoever_wants_to_keep_it_does(reference, bearded):

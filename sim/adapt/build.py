@@ -39,8 +39,8 @@ class BuildResult:
 
     head : the fitted head, in the scan's own place (mm)
     fit : mean_mm, p95_mm, max_mm (skin to scan, where the face has data), coverage (share of the face with data),
-        landmark_mean_mm (given landmarks to the skin's own), the share ``within_1mm``, what was ``invented`` and the
-        ``sentence`` that says all this; ``advice``, a sentence that says what else could be done, or None
+        landmark_mean_mm (given landmarks, but for those on a beard, to the skin's own), the share ``within_1mm``, what was
+        ``invented`` and the ``sentence`` that says all this; ``advice``, a sentence that says what else could be done, or None
     anatomy : muscles (count), skull_penetrations (bone vertices outside the skin), tissue_thickness_mm
     landmarks_missing : names of landmarks that were not given
     attributes : per skin vertex (n,) float32: ``fitted`` 0..1 (0: invented by the warp), ``distance_mm`` to the scan
@@ -111,7 +111,7 @@ def build_head(
     yield Progress(0.85, "Checking the anatomy")
     head = followed.head
     scanned = head.skin.vertices + (fit.cage - skin)
-    report = fit_report(reference, fit, given, scanned)
+    report = fit_report(reference, fit, {n: p for n, p in given.items() if n in look.landmarks}, scanned)
     shares = fitted_shares(head, fit.fitted.fitted)
     report["invented"] = invented(shares)
     jumps, ends = (float(before.area.sum() - after.area.sum()) for before, after in ((whole, smooth), (smooth, target)))
