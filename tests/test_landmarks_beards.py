@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Beards are told from the face and left out, and chin and cheeks are invented below them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from headshop.sim.adapt.closest import Surface
 from headshop.sim.adapt.scan_surface import NO_SKIN
 from headshop.sim.anatomy.landmark_names import SKIN
 from headshop.sim.landmarks import looks, placed_face
@@ -75,6 +78,29 @@ def test_a_beard_is_left_out_and_the_lips_are_not(space, bearded, laid, chin):
     assert left_out[chin].mean() > 0.97 and left_out[lips_beside(space)].mean() < 0.3
     assert not left_out[(space.face > 0.5) & (space.points[:, 2] > space.landmarks(space.points)["en_l"][2])].any()
     assert not beard_over(space, None, target).any()
+
+
+def test_a_beard_grows_where_the_scan_stands_off_or_is_rough_and_beside_that_only(space, bearded, laid):
+    target, points, _, _ = bearded(*WORN)
+    zone, middle = grows_beard(space), np.abs(space.points[:, 0]) < 20
+    bristly = points.copy()  # neither farther off nor nearer
+    bristly[:, 1] += np.random.default_rng(4).normal(0, 3, len(points))
+    for worn in (target.vertices, bristly):
+        some = Surface(np.where(middle[:, None], worn, points), space.triangles)
+        grows = thick_beard(space, laid(space, points), some).grows
+        assert grows[zone & (np.abs(space.points[:, 0]) < 15)].mean() > 0.8
+        assert not grows[~zone | (np.abs(space.points[:, 0]) > 40)].any()
+
+
+def test_a_beard_on_a_head_of_another_size_is_the_same(space, bearded, laid):
+    target, points, _, _ = bearded(*WORN)
+    fit, small = laid(space, points), Surface(0.6 * target.vertices, target.triangles)
+    child = replace(fit, points=0.6 * points, pose=replace(fit.pose, scale=0.6))
+    for of_child, of_grown in zip(heights(space, child, small), heights(space, fit, target), strict=True):
+        np.testing.assert_allclose(of_child, of_grown, atol=1e-6)
+    own, other = (thick_beard(space, *each) for each in ((child, small), (fit, target)))
+    np.testing.assert_array_equal(own.grows, other.grows)
+    np.testing.assert_array_equal(beard_over(space, own, small), beard_over(space, other, target))
 
 
 def test_what_hangs_before_the_throat_is_left_out_too(space, bearded, laid):
