@@ -197,11 +197,13 @@ def test_pictures_within_groups(made):
     assert made.shown(made.node("Emission", {"Color": group.outputs["Made"]})) == "skin"
     assert made.shown(made.node("Emission", {"Color": group.outputs["Mask"]})) is None
     nodes = group.node_tree.nodes
-    nodes.active = unused = nodes.new("NodeGroupOutput")  # the group puts out what the other one gets
-    next(node for node in nodes if node.type == "GROUP_OUTPUT" and node != unused).is_active_output = True
-    group.node_tree.links.new(nodes.new("ShaderNodeTexImage").outputs[0], unused.inputs["Made"])
-    unused.inputs["Made"].links[0].from_node.image = made.other
-    assert made.shown(made.node("Emission", {"Color": group.outputs["Made"]})) == "skin"
+    end, picture = nodes.new("NodeGroupOutput"), nodes.new("ShaderNodeTexImage")
+    group.node_tree.links.new(picture.outputs["Color"], end.inputs["Made"])
+    picture.image = made.other
+    for active, wanted in ((True, "other"), (False, "skin")):  # the group puts out what its active output gets
+        end.is_active_output = active
+        next(node for node in nodes if node.type == "GROUP_OUTPUT" and node != end).is_active_output = not active
+        assert made.shown(made.node("Emission", {"Color": group.outputs["Made"]})) == wanted
     colour = made.node("Emission", {"Color": group.outputs["Made"]})
     group.node_tree = None
     assert made.shown(colour) is None
