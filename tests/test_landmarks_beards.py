@@ -58,6 +58,7 @@ def test_where_beards_grow(reference):
     assert all(there(place) for place in (marks["pg"], marks["gn"], marks["go_l"], marks["go_r"], upper_lip))
     assert not any(there(marks[name]) for name in ("ls", "li", "ch_l", "sn", "prn", "zy_l", "t_r", "op", "g"))
     assert not beard[space.ear > 0.5].any()
+    assert not beard[space.points[:, 1] > marks["t_l"][1] + 5].any()  # nor on a nape
 
 
 def test_a_beard_stands_off_the_skin_and_is_rough(space, bearded, laid, chin):
@@ -110,9 +111,11 @@ def test_what_hangs_before_the_throat_is_left_out_too(space, bearded, laid):
     skin = points[throat][points[throat][:, 2].argmax()]
     sheet = np.array([[-4, 0, 2], [4, 0, 2], [4, 0, -2], [-4, 0, -2]])
     off = [skin - [0, HANGING + far, 0] + sheet for far in (4, -4)]  # the second as near as a collar
-    longer = target.beside(np.concatenate(off), np.array([[0, 2, 1], [0, 3, 2], [4, 6, 5], [4, 7, 6]]))
+    off.append(points[points[:, 2].argmin()] - [0, 20, 25] + sheet)  # below the neck's end: clothes
+    faces = np.array([[0, 2, 1], [0, 3, 2]])
+    longer = target.beside(np.concatenate(off), np.concatenate([faces + 4 * k for k in range(3)]))
     beard = thick_beard(space, laid(space, points), longer)
-    assert beard_over(space, beard, longer)[-4:].tolist() == [True, True, False, False]
+    assert beard_over(space, beard, longer)[-6:].tolist() == [True] * 2 + [False] * 4
 
 
 def test_a_chin_is_invented_below_a_beard(reference, space, bearded, chin):
