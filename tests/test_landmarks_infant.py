@@ -232,9 +232,17 @@ def test_what_somebody_picked_on_an_infant_is_told(reference, monkeypatch, of):
         asked.append((space, pose, told))
         return fit_shape(space, target, pose, told=told)
 
+    def beardless(reference, space, target, fit, **_):
+        beards.append(space.of_infants)
+        yield Progress(0.5, "")
+        return fit, None
+
+    beards = []
     monkeypatch.setattr(first, "fit_shape", spy)
+    monkeypatch.setattr(first, "without_beards_lead", beardless)
     finish(first_look(reference, scan, truth, found=("ch_l", "g", "t_r")))
     ((space, pose, told),) = asked
+    assert beards == ([] if of == "a child" else [False])
     assert space.of_infants == (of == "a child")
     if of != "a child":
         assert told is None
