@@ -9,6 +9,7 @@ import pytest
 from headshop.sim.adapt.closest import Surface
 from headshop.sim.adapt.scan_surface import NO_SKIN
 from headshop.sim.anatomy.landmark_names import SKIN
+from headshop.sim.landmarks import first_look as first
 from headshop.sim.landmarks import looks, placed_face
 from headshop.sim.landmarks.beards import (
     HANGING,
@@ -24,6 +25,7 @@ from headshop.sim.landmarks.find import find_landmarks
 from headshop.sim.landmarks.first_look import first_look
 from headshop.sim.landmarks.picked import moved
 from headshop.sim.landmarks.shape_space import shape_space
+from headshop.sim.landmarks.unseen_jaw import JAW
 from headshop.sim.mesh import Mesh
 from headshop.sim.progress import finish
 
@@ -151,6 +153,15 @@ def test_landmarks_picked_on_a_beard_do_not_pull_the_chin_out_to_it(reference, s
     assert not {"pg", "gn"} & set(look.landmarks) and set(_given(marks)) <= set(look.landmarks)
     for name in ("pg", "gn"):
         assert np.linalg.norm(look.guessed[name] - marks[name]) < 6 < look.filled.closest(on[name]).distance[0]
+
+
+def test_below_a_beard_no_jaw_is_looked_for_that_the_scan_ends_above(reference, bearded, monkeypatch):
+    """What is left of the scan ends at the mouth; that is no end of it."""
+    target, _, marks, _ = bearded(*WORN)
+    for name in ("with_unseen_jaw", "unseen_jaw"):
+        monkeypatch.setattr(first, name, lambda *_: pytest.fail("one was"))
+    given = {n: p for n, p in _given(marks).items() if n not in JAW}
+    assert finish(first_look(reference, target, given, ["beard"])).left_out["beard"] > 0
 
 
 def test_whoever_wants_to_keep_it_does(reference, bearded):
