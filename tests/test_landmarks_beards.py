@@ -9,8 +9,8 @@ import pytest
 from headshop.sim.adapt.closest import Surface
 from headshop.sim.adapt.scan_surface import NO_SKIN
 from headshop.sim.anatomy.landmark_names import SKIN
+from headshop.sim.landmarks import find, looks, placed_face
 from headshop.sim.landmarks import first_look as first
-from headshop.sim.landmarks import looks, placed_face
 from headshop.sim.landmarks.beards import (
     HANGING,
     UNDER_CHIN,
@@ -26,6 +26,7 @@ from headshop.sim.landmarks.first_look import first_look
 from headshop.sim.landmarks.picked import moved
 from headshop.sim.landmarks.shape_space import shape_space
 from headshop.sim.landmarks.unseen_jaw import JAW
+from headshop.sim.landmarks.verdict import likeness_of
 from headshop.sim.mesh import Mesh
 from headshop.sim.progress import finish
 
@@ -175,7 +176,13 @@ def test_a_bare_chin_is_no_beard(reference, bearded):
     assert finish(first_look(reference, target, marks)).left_out["beard"] == 0.0
 
 
-def test_landmarks_of_a_bearded_face(reference, bearded):
+def test_relief_that_a_beard_hides_says_nothing_of_a_face_above_it(reference, space, bearded, laid):
+    fit = laid(space, bearded(*WORN)[0].vertices[: len(space.points)])
+    assert likeness_of(reference, above_beard(space), fit) > likeness_of(reference, space, fit) + 0.05
+
+
+def test_landmarks_of_a_bearded_face(reference, bearded, monkeypatch):
+    monkeypatch.setattr(find, "with_unseen_jaw", lambda *_: pytest.fail("the scan was taken to end at the beard"))
     target, _, marks, _ = bearded(*WORN)
     found = finish(find_landmarks(Mesh.from_triangles(target.vertices, target.triangles), reference))
     off = {n: np.linalg.norm(p - marks[n]) for n, p in found.positions.items() if n in marks}
@@ -194,5 +201,13 @@ def test_a_face_that_nothing_but_its_upper_half_and_lips_shows_is_found(referenc
     assert not of.area[grows_beard(space)].any() and np.array_equal(of.area, above_beard(space).area)
     laid_on = of.landmarks(fit.points)
     assert np.mean([np.linalg.norm(laid_on[n] - marks[n]) for n in ("prn", "sn", "n", "en_l", "ex_r", "sto")]) < 4.0
+    lead, asked = find.without_beards_lead, []
+
+    def spy(reference, space, target, fit, above):
+        asked.append((space.area.all(), above))
+        return lead(reference, space, target, fit, above)
+
+    monkeypatch.setattr(find, "without_beards_lead", spy)
     found = finish(find_landmarks(mesh, reference))
+    assert asked == [(True, True)]  # from there on skin counts where beards grow, too
     assert {"pg", "gn"} <= set(found.mid_air)
