@@ -11,12 +11,13 @@ from scipy.spatial import cKDTree
 from ..sim.anatomy.head import MATERIALS, Eye, Head, Muscle
 from ..sim.mesh import Mesh
 from ..sim.progress import Progress, Work, finish, portion
+from ..sim.scan.iris_colour import iris_colour
 from ..sim.scan.shown_skin import shown_skin
 from . import bridge, heads
 from .anatomy_materials import FIBRE, REST, anatomy_material
 from .detail_images import images_of
 from .eye_materials import EYE, IRIS, IRIS_COLOUR, eye_material
-from .scan_colour import ScanColour, colour_image, iris_colour, unseen_skin
+from .scan_colour import ScanColour, colour_image, unseen_skin
 from .scan_texture import with_pictures
 from .skin_material import COLOUR, skin_material
 from .skin_paint import paint_skin, write_vectors

@@ -43,8 +43,9 @@ class ScanColour:
     def __init__(self, scan: Mesh, about: np.ndarray | None = None):
         whole, normals = ~specks(scan), vertex_normals(scan.vertices, scan.triangles)
         self.size = SIZE
-        if has_pictures(scan):
-            scan, normals, spacing = _between_vertices(scan, whole, about)
+        chosen = _looked_at(scan, whole, about)
+        if chosen.any():
+            scan, normals, spacing = _between_vertices(scan, chosen)
             whole, self.size = slice(None), _size_for(spacing)
         self.points = points = scan.vertices[whole]
         self.scan = scan
@@ -80,13 +81,20 @@ class ScanColour:
         return colour, confidence * np.clip(2 * trust - 1, 0, 1)
 
 
-def _between_vertices(scan: Mesh, whole: np.ndarray, about: np.ndarray | None):
-    """Points (k, 3) with colours all over the ``whole`` (n,) bool of a scan with pictures on it, as a `Mesh` without faces, its
-    normals there (k, 3), and mm that the points are apart: as far as the pictures' texels, within reason."""
+def _looked_at(scan: Mesh, whole: np.ndarray, about: np.ndarray | None) -> np.ndarray:
+    """(t,) bool: the triangles of the ``whole`` (n,) bool scan on which its pictures are looked at, none if it has none."""
+    if not has_pictures(scan):
+        return np.zeros(len(scan.triangles), dtype=bool)
     chosen = whole[scan.triangles].all(axis=1)
     if about is not None:
         low, high = about.min(axis=0) - FAR, about.max(axis=0) + FAR
         chosen &= ((scan.vertices > low) & (scan.vertices < high)).all(axis=1)[scan.triangles].any(axis=1)
+    return chosen
+
+
+def _between_vertices(scan: Mesh, chosen: np.ndarray):
+    """Points (k, 3) with colours all over the ``chosen`` (t,) bool triangles of a scan with pictures on it, as a `Mesh` without
+    faces, its normals there (k, 3), and mm that the points are apart: as far as the pictures' texels, within reason."""
     spacing = float(np.clip(texel_size(scan, chosen), FINE, TEXEL))
     points, normals, colour = strewn(scan, spacing, chosen)
     return Mesh(points, np.zeros((0, 4), np.int32), colour=colour), normals, spacing
@@ -96,32 +104,6 @@ def _size_for(spacing: float) -> int:
     """Pixels of an image that shows what is ``spacing`` mm apart: `SIZE`, or a power of two up to `LARGE`."""
     wanted = SIZE * TEXEL / spacing
     return SIZE if wanted <= SIZE else min(2 ** int(np.ceil(np.log2(wanted))), LARGE)
-
-
-def iris_colour(scan: Mesh, eyes) -> np.ndarray | None:
-    """(3,) linear colour of the irises as the scan saw them, or None where it cannot be told.
-
-    Closed lids and a scanner's guesses show skin there: only what is cooler or much darker than skin is believed.
-    """
-    colour = to_linear(np.asarray(scan.colour, dtype=float))
-    ring, around = [], []
-    for eye in eyes:
-        gaze = eye.gaze / np.linalg.norm(eye.gaze)
-        offset = scan.vertices - eye.centre
-        depth = offset @ gaze
-        radius = np.linalg.norm(offset - depth[:, None] * gaze, axis=1) / eye.radius
-        near = (depth > 0.6 * eye.radius) & (depth < 1.5 * eye.radius)
-        ring.append(colour[near & (radius > 0.24) & (radius < 0.42)])
-        around.append(colour[(depth > 0) & (radius > 2.0) & (radius < 3.0)])
-    ring, around = np.concatenate(ring), np.concatenate(around)
-    if len(ring) < 20 or len(around) < 20:
-        return None
-    found, skin = np.median(ring, axis=0), np.median(around, axis=0)
-    cooler = found[2] / max(found[0], 1e-4) > 1.5 * skin[2] / max(skin[0], 1e-4)
-    if not cooler and found @ LUMINANCE > 0.3 * (skin @ LUMINANCE):
-        return None
-    # a colour, not the light it was seen in; the lightest irises return about a sixth of the light
-    return found * np.clip(found @ LUMINANCE, 0.03, 0.16) / max(found @ LUMINANCE, 1e-4)
 
 
 def unseen_skin(skin: Mesh, inner: np.ndarray, hidden: np.ndarray | None) -> np.ndarray:

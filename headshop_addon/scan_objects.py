@@ -16,10 +16,10 @@ from ..sim.adapt.landmarks import read_landmark_file, write_landmarks
 from ..sim.anatomy.landmark_names import SKIN
 from ..sim.errors import InputError
 from ..sim.progress import Work, finish
+from ..sim.scan.joined import joined
 from ..sim.scan.orientation import Orientation
 from ..sim.scan.units import BY_FACE, unit_words
 from . import active, bridge, heads, pipeline, scan_landmarks
-from .scan_import import joined
 from .scan_texture import with_pictures
 
 TURN = "headshop_turn"

@@ -58,12 +58,12 @@ def picture_beside(path: Path, name: str) -> np.ndarray | None:
     none, or none that can be read."""
     relative = name.replace("\\", "/")  # written on Windows
     for place in (path.parent / relative, path.parent / PurePosixPath(relative).name):
-        if not place.is_file():
-            continue
         try:
+            if not place.is_file():
+                continue
             image = bpy.data.images.load(str(place.resolve()))
-        except RuntimeError:
-            return None
+        except (OSError, RuntimeError):  # the first: of a name that is too long, or in a folder that is closed
+            continue
         try:
             return pixels_of(image)
         finally:

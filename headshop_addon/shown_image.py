@@ -25,6 +25,8 @@ def image_of(material: bpy.types.Material) -> bpy.types.Image | None:
     while ahead:
         target, within = ahead.pop()
         for link in target.links:
+            if link.is_muted:
+                continue
             node, source = link.from_node, link.from_socket
             if (node, source.identifier, within) in seen:
                 continue

@@ -123,6 +123,16 @@ def test_a_picture_beside_a_ply_comes_in_with_it(bpy, sheet, ply, name):
     _check(scan, metres=False)
 
 
+def test_a_picture_in_a_folder_beside_a_ply_counts_before_one_beside_it(bpy, tmp_path, sheet, ply):
+    from headshop.headshop_addon import scan_import
+
+    (tmp_path / "maps").mkdir()
+    (tmp_path / "skin.png").rename(tmp_path / "maps" / "skin.png")
+    for _ in range(2):
+        _check(scan_import.read_scan(ply("maps\\skin.png")), metres=False)
+        (tmp_path / "skin.png").write_bytes(b"Another one.")
+
+
 def test_a_ply_shows_its_pictures_by_number(bpy, tmp_path, sheet, ply):
     from headshop.headshop_addon import scan_import
 
@@ -135,12 +145,15 @@ def test_a_ply_shows_its_pictures_by_number(bpy, tmp_path, sheet, ply):
     low, high = scan.vertices[:, 2] < 52, scan.vertices[:, 2] > 59
     np.testing.assert_allclose(scan.colour[high], np.tile([0, 0, 1], (high.sum(), 1)), atol=0.01)
     _check(Mesh(scan.vertices[low], scan.faces[:0], colour=scan.colour[low]), metres=False)
+    path = tmp_path / "scan.ply"
+    path.write_bytes(path.read_bytes().replace(b"comment TextureFile other.png\n", b""))
+    assert scan_import.read_scan(path).pictures[1:] == (None,)  # for the faces of a picture that is not named
     (tmp_path / "other.png").unlink()
-    scan = scan_import.read_scan(tmp_path / "scan.ply")
+    scan = scan_import.read_scan(ply("skin.png", number=True))
     assert scan.pictures[1] is None and (scan.colour[high] == 1).all()
 
 
-@pytest.mark.parametrize("kind", ["gone", "a letter", "a folder", "cut off", "no name"])
+@pytest.mark.parametrize("kind", ["gone", "a letter", "a folder", "cut off", "no name", "a long name"])
 def test_a_ply_whose_picture_cannot_be_read_comes_in_without_colours(bpy, tmp_path, sheet, ply, kind):
     from headshop.headshop_addon import scan_import
 
@@ -152,7 +165,7 @@ def test_a_ply_whose_picture_cannot_be_read_comes_in_without_colours(bpy, tmp_pa
     elif kind == "cut off":
         picture.write_bytes((tmp_path / "skin.png").read_bytes()[:40])
     before = scan_import.datablocks()
-    scan = scan_import.read_scan(ply("\0.png" if kind == "no name" else picture.name))
+    scan = scan_import.read_scan(ply({"no name": "\0.png", "a long name": "a" * 300}.get(kind, picture.name)))
     assert not has_pictures(scan) and scan.colour is None and len(scan.faces) > 400
     assert scan_import.datablocks() == before
 
@@ -243,6 +256,16 @@ def test_a_head_is_dressed_in_the_pictures_of_its_scan(bpy, reference, monkeypat
     with pytest.raises(LookupError):
         materials.dress_head(next(obj for obj in collection.objects if heads.is_skin(obj)))
     assert has_pictures(asked[0])
+
+
+def test_a_scan_with_a_picture_that_lies_elsewhere_colours_nothing(reference):
+    """As one that was dragged aside to compare it."""
+    from headshop.headshop_addon.scan_colour import ScanColour, vertex_colour
+
+    scan = replace(_sheet(), vertices=_sheet().vertices + [900.0, 0, 0], colour=vertex_colours(_sheet()))
+    seen = ScanColour(scan, reference.skin.vertices)
+    assert len(seen.points) == len(scan.vertices) == len(seen.trust)
+    assert vertex_colour(reference.skin, seen, reference.groups["inner"]) is None
 
 
 def test_skin_shows_what_a_picture_shows_between_the_vertices_of_a_scan():

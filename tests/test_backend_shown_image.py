@@ -196,6 +196,14 @@ def test_pictures_within_groups(made):
     group = made.group(inner)
     assert made.shown(made.node("Emission", {"Color": group.outputs["Made"]})) == "skin"
     assert made.shown(made.node("Emission", {"Color": group.outputs["Mask"]})) is None
+    nodes = group.node_tree.nodes
+    end, picture = nodes.new("NodeGroupOutput"), nodes.new("ShaderNodeTexImage")
+    group.node_tree.links.new(picture.outputs["Color"], end.inputs["Made"])
+    picture.image = made.other
+    for active, wanted in ((True, "other"), (False, "skin")):  # the group puts out what its active output gets
+        end.is_active_output = active
+        next(node for node in nodes if node.type == "GROUP_OUTPUT" and node != end).is_active_output = not active
+        assert made.shown(made.node("Emission", {"Color": group.outputs["Made"]})) == wanted
     colour = made.node("Emission", {"Color": group.outputs["Made"]})
     group.node_tree = None
     assert made.shown(colour) is None
@@ -208,6 +216,14 @@ def test_muted_nodes_pass_through_and_muted_pictures_are_none(made):
     colour.node.mute = True
     assert made.shown(shader) == "skin"
     first.node.mute = True
+    assert made.shown(shader) is None
+
+
+def test_links_that_are_muted_pass_nothing_on(made):
+    shader = made.node("BsdfPrincipled", {"Base Color": made.picture(made.skin)})
+    assert made.shown(shader) == "skin"
+    (link,) = shader.node.inputs["Base Color"].links
+    link.is_muted = True
     assert made.shown(shader) is None
 
 
@@ -232,8 +248,9 @@ def test_links_in_a_circle_come_to_an_end(made):
 
 def test_an_adopted_object_shows_what_its_group_does(made):
     """Up to the colours of the mesh."""
-    from headshop.headshop_addon import bridge, scan_import, scan_texture
+    from headshop.headshop_addon import bridge, scan_texture
     from headshop.sim.mesh import Mesh
+    from headshop.sim.scan.joined import joined
 
     def glowing(graph, tint):
         return graph.node("Emission", {0: graph.node("TexImage", image=made.skin).outputs[0]}).outputs[0]
@@ -244,5 +261,5 @@ def test_an_adopted_object_shows_what_its_group_does(made):
     uv = np.zeros((1, 4, 2), np.float32) + 0.5
     obj = bridge.mesh_to_object(Mesh(points, np.array([[0, 1, 2, -1]], np.int32), uv=uv), "scan")
     obj.data.materials.append(made.material)
-    scan = scan_import.joined([scan_texture.with_pictures(bridge.object_to_mesh(obj), obj)])
+    scan = joined([scan_texture.with_pictures(bridge.object_to_mesh(obj), obj)])
     np.testing.assert_allclose(scan.colour, [[0, 1, 0]] * 3, atol=1e-6)

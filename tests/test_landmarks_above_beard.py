@@ -46,8 +46,17 @@ def test_where_a_beard_is_looked_for_on_rough_chins_only_others_take_no_time(ref
     assert finish(without_beards_lead(reference, space, target, fit, rough=True)) == (fit, None)
 
 
-def test_a_face_found_without_regard_to_a_beard_that_has_none_is_laid_on_all(reference, bearded):
+def test_a_face_found_without_regard_to_a_beard_that_has_one_is_laid_beside_it(reference, bearded):
     space = shape_space(reference)
+    target, _, truth, _ = bearded(3, 12, 25)
+    above = finish(fit_shape(above_beard.above_beard(space), target, HERE))
+    again, beard = finish(without_beards_lead(reference, space, target, above, above=True))
+    assert beard is not None and again is not above and _off(space, again, truth) < 4.5
+
+
+def test_a_face_found_without_regard_to_a_beard_that_has_none_is_laid_on_all(reference, bearded, monkeypatch):
+    space = shape_space(reference)
+    monkeypatch.setattr(above_beard, "BETTER", 0.0)  # whether that is better or not
     target, _, truth, _ = bearded(3, 0, 0)
     above = finish(fit_shape(above_beard.above_beard(space), target, HERE))
     again, beard = finish(without_beards_lead(reference, space, target, above, above=True))

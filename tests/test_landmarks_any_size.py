@@ -75,7 +75,7 @@ def _result(space, size, verdict=PLAIN, scale=1.0):
 )
 def test_a_small_head_is_a_persons_if_its_face_is_a_babys(reference, size, baby, human):
     space, asked = shape_space(reference), []
-    grown = judged(reference, space, _result(space, 1.0)[2], looks.LOOKS[-1].relief)
+    grown = judged(reference, space, _result(space, 1.0)[2], looks.THOROUGH.relief)
 
     def or_infant(given, less):
         verdict, _, fit, target, _ = given

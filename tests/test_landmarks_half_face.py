@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Scans of one side of a face, as a scanner beside it or a cut through the middle leaves them: the other side is told by it."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -130,6 +132,29 @@ def test_half_a_face_is_looked_for_where_little_of_one_is_found(
     _, fit, _, _ = finish(placed_face.place_face(somebody[0], reference, space, (1.0,)))
     assert looked == list(LOOKS[:taken]) and fit is laid_on
     assert [look.half for look in LOOKS[:2]] == [False, True]
+
+
+@pytest.mark.parametrize(("look", "wanted"), list(zip(LOOKS, (0.7, 0.7, 0.7, 0.7, 0.8), strict=True)))
+def test_further_places_must_show_as_much_of_a_face_as_in_a_thorough_look(reference, space, monkeypatch, look, wanted):
+    """Whatever looks there are besides: those above a beard, of less of a face, ask for more."""
+    asked = []
+
+    def doubted(reference, space, fit, relief):
+        asked.append(relief)
+        return Verdict(True, 9.0, 0.3)
+
+    monkeypatch.setattr(looking, "fit_shape", lambda *_, **__: iter(()))
+    monkeypatch.setattr(looking, "lies", lambda *_: None)
+    monkeypatch.setattr(looking, "judged", doubted)
+    rival = 1.0, 1.0, SimpleNamespace(pose=None, coefficients=None), None
+    monkeypatch.setattr(looking, "run", lambda *_: (yield from _result(rival[2])))
+    finish(looking._fits(look, reference, space, space, [rival, rival], 1))
+    assert asked[:2] == [look.relief, wanted] and set(asked[2:]) == {wanted}
+
+
+def _result(value):
+    yield Progress(0.5, "")
+    return value
 
 
 def test_what_a_scan_shows_on_the_other_side_only_is_filled_in(space, laid):

@@ -179,6 +179,10 @@ def test_an_odd_face_may_be_an_infants(reference, space, monkeypatch, bad, asked
     monkeypatch.setattr(placed_face, "share_of", lambda *_: 1.0)
     _, fit, _, of = finish(placed_face.place_face(reference.skin, reference, space, (1.0,)))
     assert (fit, of.of_infants) == (("infant", True) if asked else ("grown", False))
+    monkeypatch.setattr(placed_face, "LOOKS", LOOKS[-1:])  # above a beard, which no infant has
+    monkeypatch.setattr(placed_face, "PARTS", PARTS[-1:])
+    _, fit, _, of = finish(placed_face.place_face(reference.skin, reference, space, (1.0,)))
+    assert (fit, of.of_infants) == ("grown", False) and not of.area.all()
 
 
 def _child(reference, seed, size, low):
@@ -228,9 +232,17 @@ def test_what_somebody_picked_on_an_infant_is_told(reference, monkeypatch, of):
         asked.append((space, pose, told))
         return fit_shape(space, target, pose, told=told)
 
+    def beardless(reference, space, target, fit, **_):
+        beards.append(space.of_infants)
+        yield Progress(0.5, "")
+        return fit, None
+
+    beards = []
     monkeypatch.setattr(first, "fit_shape", spy)
+    monkeypatch.setattr(first, "without_beards_lead", beardless)
     finish(first_look(reference, scan, truth, found=("ch_l", "g", "t_r")))
     ((space, pose, told),) = asked
+    assert beards == ([] if of == "a child" else [False])
     assert space.of_infants == (of == "a child")
     if of != "a child":
         assert told is None

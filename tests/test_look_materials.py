@@ -309,9 +309,9 @@ def test_staging_twice_leaves_one_stage(bpy, skin):
 
 def test_the_iris_takes_the_scans_colour_only_where_an_eye_was_seen(reference):
     pytest.importorskip("bpy")
-    from headshop.headshop_addon.scan_colour import iris_colour
     from headshop.sim.mesh import Mesh
     from headshop.sim.scan.colour_space import to_srgb
+    from headshop.sim.scan.iris_colour import iris_colour
 
     skin = reference.skin.vertices
     eyes = [reference.parts[part].vertices for part in ("eye_l", "eye_r")]

@@ -78,6 +78,24 @@ def test_a_number_may_be_that_of_vertices(tmp_path, write_rows):
     assert mesh.material.tolist() == [0, 1]
 
 
+def test_whole_numbers_of_a_text_that_are_none_or_too_large_are_the_nearest_that_are(tmp_path, write_rows):
+    flags = [0, 300, 1e30, -5, np.nan, 255, 7, 8, 9]
+    vertices = (
+        [*XYZ, *(f"uchar {name}" for name in ("red", "green", "blue"))],
+        [(*p, flag, 255, 0) for p, flag in zip(POINTS, flags, strict=True)],
+    )
+    mesh = read_ply(write_rows(tmp_path / "a.ply", "ascii", {"vertex": vertices, "face": ([CORNERS], [([0, 1, 4],)])}))
+    np.testing.assert_allclose(mesh.colour[:, 0] * 255, [0, 255, 255, 0, 0, 255, 7, 8, 9], atol=1e-4)
+
+
+@pytest.mark.parametrize("corners", [[0, 1, -1], [0, 1, 4, -1], [0, 1, 4, 3, -1], [0, 1, 9], [0, 1, -2]])
+@pytest.mark.parametrize("encoding", FORMATS)
+def test_faces_of_vertices_that_do_not_exist_are_refused(tmp_path, write_rows, encoding, corners):
+    elements = {"vertex": (XYZ, POINTS), "face": ([CORNERS], [([0, 1, 4],), (corners,)])}
+    with pytest.raises(InputError, match="does not exist"):
+        read_ply(write_rows(tmp_path / "a.ply", encoding, elements))
+
+
 def test_without_a_picture_or_without_places_nothing_is_said_of_any(tmp_path, write_rows):
     vertices = [*XYZ, "float s", "float t"], [(*p, *_place(k)) for k, p in enumerate(POINTS)]
     faces = [CORNERS], [([0, 1, 4],)]

@@ -51,6 +51,7 @@ def test_skin_is_skin(reference, scanned):
     assert (_asked(reference, points, colour) == 1).all()
     nothing = np.zeros(len(reference.skin.vertices), dtype=bool)
     assert (_asked(reference, points, colour, nothing) == 1).all()
+    assert _asked(reference, points[:0], colour[:0], nothing).shape == (0,)
 
 
 def test_strands_of_hair_beyond_its_edge_are_not_skin_and_skin_between_them_is(reference, scanned):
@@ -123,6 +124,20 @@ def test_brows_and_beards_beside_hair_stay(reference, scanned):
     for own in (brow & ~hidden[nearest] & (away < 25), beard & (away > 24) & (away < 30)):
         own = _inside(points, own, 1.0)
         assert own.sum() > 20 and trust[own].mean() > 0.95
+
+
+def test_strands_on_a_nape_are_no_beard(reference, scanned):
+    """Behind the ears hair hangs as far as above them."""
+    points, nearest, colour = scanned
+    at = reference.landmark_positions()
+    low, behind = at["t_l"][2] - 10, at["t_l"][1] + 20
+    hidden = (reference.skin.vertices[:, 2] > low) & (reference.groups["scalp"] > 0.5)
+    hidden |= (reference.skin.vertices[:, 2] > low) & (reference.skin.vertices[:, 1] > behind)
+    away = cKDTree(reference.skin.vertices[hidden]).query(points)[0]
+    strand = (points[:, 1] > behind) & (points[:, 2] < low) & (away > 18) & (away < 28) & _stripes(points)
+    colour = np.where((hidden[nearest] | strand)[:, None], HAIR, colour)
+    own = _inside(points, strand)
+    assert own.sum() > 50 and np.quantile(_asked(reference, points, colour, hidden)[own], 0.95) < 0.2
 
 
 def test_a_cover_that_looks_like_skin_or_is_hardly_seen_tells_nothing(reference, scanned):

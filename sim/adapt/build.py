@@ -39,13 +39,13 @@ class BuildResult:
 
     head : the fitted head, in the scan's own place (mm)
     fit : mean_mm, p95_mm, max_mm (skin to scan, where the face has data), coverage (share of the face with data),
-        landmark_mean_mm (given landmarks to the skin's own), the share ``within_1mm``, what was ``invented`` and the
-        ``sentence`` that says all this; ``advice``, a sentence that says what else could be done, or None
+        landmark_mean_mm (given landmarks, but for those on a beard, to the skin's own), the share ``within_1mm``, what was
+        ``invented`` and the ``sentence`` that says all this; ``advice``, a sentence that says what else could be done, or None
     anatomy : muscles (count), skull_penetrations (bone vertices outside the skin), tissue_thickness_mm
     landmarks_missing : names of landmarks that were not given
     attributes : per skin vertex (n,) float32: ``fitted`` 0..1 (0: invented by the warp), ``distance_mm`` to the scan
-        (positive outside, NaN where there is no data); and (n,) bool ``hidden``: scalp without data, and skin under hair or
-        behind what the lips hold
+        (positive outside, NaN where there is no data); and (n,) bool ``hidden``: scalp without data, and skin under hair,
+        under a beard or behind what the lips hold
     detail : displacement and normal map of what is finer than the mesh; None if not asked for
     scanned : (n, 3) mm, the head's skin with the expression that it was scanned with; None where it was not relaxed
     """
@@ -73,8 +73,8 @@ def build_head(
     detail : texels along a side of the detail maps; 0 for none
     relax : ``auto`` makes a face neutral whose lips are parted (`sim.relax`), ``always`` any, ``never`` none. The figures
         in ``fit`` are those of the face as scanned.
-    leave_out : ``auto`` leaves out of the scan what is no skin, jumps of a depth map, flat ends, what the lips hold and hair,
-        ``never`` nothing, names of these with commas between just those (`scan_surface.to_leave_out`)
+    leave_out : ``auto`` leaves out of the scan what is no skin, all of `scan_surface.NO_SKIN`, ``never`` nothing, names of
+        these with commas between just those (`scan_surface.to_leave_out`)
     found : names of the landmarks that nobody picked: the skin is held to them more loosely
 
     Raises
@@ -111,7 +111,7 @@ def build_head(
     yield Progress(0.85, "Checking the anatomy")
     head = followed.head
     scanned = head.skin.vertices + (fit.cage - skin)
-    report = fit_report(reference, fit, given, scanned)
+    report = fit_report(reference, fit, {n: p for n, p in given.items() if n in look.landmarks}, scanned)
     shares = fitted_shares(head, fit.fitted.fitted)
     report["invented"] = invented(shares)
     jumps, ends = (float(before.area.sum() - after.area.sum()) for before, after in ((whole, smooth), (smooth, target)))

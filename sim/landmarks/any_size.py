@@ -12,7 +12,7 @@ from ..scan.face_match import surface_samples
 from ..scan.units import SMALLEST, is_human, sizes_to_try
 from .infant import infant_space
 from .looking import lies, looked
-from .looks import ANY_SIZE, LOOKS, PLAIN, WHOLE
+from .looks import ANY_SIZE, PLAIN, THOROUGH, WHOLE
 from .shape_space import ShapeSpace
 from .verdict import ODD, judged, share_of
 
@@ -65,7 +65,7 @@ def _resized(reference, result, factor):
     _, scale, fit, target, space = result
     pose = replace(fit.pose, scale=factor * fit.pose.scale, shift=factor * fit.pose.shift)
     fit = replace(fit, points=factor * fit.points, distance=factor * fit.distance, pose=pose)
-    verdict = judged(reference, space, fit, LOOKS[-1].relief)
+    verdict = judged(reference, space, fit, THOROUGH.relief)
     return verdict, factor * scale, fit, Surface(factor * target.vertices, target.triangles, NORMALS), space
 
 

@@ -28,6 +28,7 @@ REACH, HANGING = 90.0, 6.0
 #: Share of the chin that is so `HIGH` under a beard: of 17, .30 to .85; of a goatee .24, a moustache .08. And of a thick one,
 #: .66 and more; a hand on a cheek came to .34.
 SHARE, THICK = 0.25, 0.5
+ON_IT = 2.0  # mm to a beard within which a landmark that stands off the skin as those that hang do is picked on it
 OVER_SKIN = 60.0  # mm behind a beard to which skin is hidden by it
 #: Share of the chin that is rough where a beard may be: of those, .71 and more; of smooth scans of 16 faces .24 at most, of
 #: noisy ones as much as of beards. And that so rough as only thick beards and very noisy scans are.
@@ -126,6 +127,17 @@ def beard_over(space: ShapeSpace, beard: Beard | None, target: Surface) -> np.nd
     high = np.einsum("ij,ij->i", middle[use] - found.points[use], found.normals[use])
     out[use] = beard.grows[near] | (beard.hangs[near] & (high > HANGING * size))
     return out
+
+
+def picked_on(space: ShapeSpace, fit: ShapeFit, beard: Surface, picks: dict[str, np.ndarray]) -> set[str]:
+    """The names of ``picks``, name -> (3,) mm, that lie on a ``beard`` well before the skin of ``fit`` below it: they tell
+    where its surface is, and nothing of the chin."""
+    if not picks:
+        return set()
+    size, places = fit.pose.scale, np.array(list(picks.values()))
+    on = beard.closest(places).distance < ON_IT * size
+    on &= Surface(fit.points, space.triangles).closest(places).distance > HANGING * size
+    return {name for name, there in zip(picks, on, strict=True) if there}
 
 
 def fit_beside(space: ShapeSpace, beard: Beard, target: Surface):

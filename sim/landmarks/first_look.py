@@ -19,7 +19,7 @@ from ..mesh import Mesh
 from ..progress import Work, portion
 from ..relax.mouth_gap import MARKS
 from .above_beard import without_beards_lead
-from .beards import OVER_SKIN, beard_over
+from .beards import OVER_SKIN, beard_over, picked_on
 from .confidence import in_mid_air
 from .expression import fit_expression
 from .glasses import BEFORE_SKIN, fit_without_glasses, glasses_seen
@@ -45,11 +45,11 @@ FEWEST = 4  # landmarks that tell where the head is
 
 @dataclass(frozen=True, eq=False)
 class FirstLook:
-    """landmarks : name -> (3,) mm, those given and those of lids that are seen; lips : about where their landmarks are if
-    they are parted, if only a little, or None; target : the scan without what the lips hold, hair, glasses and beards;
-    left_out : how much of it that is, mm²; filled : with skin behind it, and where it lacks the scalp, as that probably is;
-    hidden (k,) : vertices of the reference's skin that make that up; guessed : name -> (3,) mm, about where others are; laid :
-    the same of those given that the face tells, where it has them itself."""
+    """landmarks : name -> (3,) mm, those given, without those on a beard, and those of lids that are seen; lips : about where
+    their landmarks are if they are parted, if only a little, or None; target : the scan without what the lips hold, hair,
+    glasses and beards; left_out : how much of it that is, mm²; filled : with skin behind it, and where it lacks the scalp, as
+    that probably is; hidden (k,) : vertices of the reference's skin that make that up; guessed : name -> (3,) mm, about where
+    others are; laid : the same of those given that the face tells, where it has them itself."""
 
     landmarks: dict[str, np.ndarray]
     target: Surface
@@ -104,10 +104,9 @@ def first_look(
             work = without_beards_lead(reference, space, coarse, fit, rough=True)
             fit, beard = yield from portion(work, 0.5, 0.53)
         grown = beard_over(space, beard, target)
-        bearded = target.vertices[target.triangles[grown].ravel()]
-        beard_area = target.area[grown].sum()
+        bearded, beard_area = target.vertices[target.triangles[grown].ravel()], target.area[grown].sum()
         if grown.any():
-            target = target.without(grown)
+            on_beard, target = target.without(~grown), target.without(grown)
             coarse = target.coarser()
         if "glasses" in leave_out:
             fit, telling = yield from run(fit_without_glasses(space, coarse, fit), 0.53, 0.55, LOOKING)
@@ -154,7 +153,8 @@ def first_look(
     hidden |= unseen_face(space, fit, left, picks[in_mid_air(left, picks)])
     filled = with_hidden_skin(space, fit, hidden & ~under, left)
     below = {n for n, corners in zip(space.names, space.corners, strict=True) if under[corners].all()}
-    chin = {n: given[n] - fit.matrix @ moved(n) for n in clear if n in below and n not in found}
+    misled = picked_on(space, fit, on_beard, {n: clear[n] for n in clear if n in below}) if grown.any() else set()
+    chin = {n: given[n] - fit.matrix @ moved(n) for n in clear if n in below and n not in (*found, *misled)}
     filled = with_hidden_skin(space, fit, under, filled, TOLD if chin else COVERED, chin)
     hidden |= under
     no_ear = space.ear < EAR  # ears take the reference's shape
@@ -164,6 +164,8 @@ def first_look(
     areas = (target.area[held].sum(), target.area[shows].sum(), glasses_area, beard_area)
     out = dict(zip(KINDS, map(float, areas), strict=True))
     own = {n: places[n] for n in clear if n in places}
+    landmarks = {n: p for n, p in landmarks.items() if n not in misled}
+    guessed |= {n: laid[n] for n in misled}
     return FirstLook(landmarks, left, filled, lips, out, space.vertices[hidden | covered | unseen], guessed, own)
 
 

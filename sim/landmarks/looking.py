@@ -13,7 +13,7 @@ from ..mesh import Mesh, vertex_normals
 from ..progress import Progress, Work, portion
 from ..scan.face_match import surface_samples
 from ..scan.flat_cuts import beyond
-from .looks import CLEAR, LOOKS, Look, templates_of
+from .looks import CLEAR, THOROUGH, Look, templates_of
 from .pose_search import LOOKING, Pose, search_poses
 from .shape_fit import LEAST, TRIAL, NoFaceError, fit_shape
 from .shape_space import ShapeSpace
@@ -79,7 +79,7 @@ def _fits(look, reference, space, few, rivals, good) -> Work:
     one: a trial knows turn and size of a face to ten degrees and a tenth; what those are off goes into the shape, and
     comes out of it only bit by bit.
     """
-    results = []
+    results, thorough = [], max(look.relief, THOROUGH.relief)
     for k, (_, scale, fit, target) in enumerate(rivals):
         if k >= good and _any_face(results):
             break
@@ -88,7 +88,7 @@ def _fits(look, reference, space, few, rivals, good) -> Work:
             fit = yield from run(work, *(0.5 * (k + np.arange(2)) / len(rivals)), FITTING)
         except NoFaceError:
             continue
-        relief = look.relief if k < good else LOOKS[-1].relief
+        relief = look.relief if k < good else thorough
         results.append((judged(reference, space, fit, relief), scale, fit, target))
     parts = iter(np.linspace(0.5, 1.0, look.again * TURNS + 1))
     done = next(parts)
@@ -107,7 +107,7 @@ def _fits(look, reference, space, few, rivals, good) -> Work:
                 fit = yield from run(work, (3 * before + done) / 4, done, FITTING)
             except NoFaceError:
                 break
-            verdict = judged(reference, space, fit, LOOKS[-1].relief)
+            verdict = judged(reference, space, fit, thorough)
             results.append((verdict, scale, fit, target))
             if verdict.likeness < start.likeness + 0.01:
                 break

@@ -49,9 +49,10 @@ QUICK = (
     Look(False, False, False, 1.0, STARTS, SURVIVORS, 10, 3, 1.25, 5, 2, 0.53, 0.0),
     Look(False, True, False, 1.0, STARTS, SURVIVORS, 4, 2, 1.25, 2, 1, 0.7, 2.0),
 )
+THOROUGH = Look(False, False, False, 0.8, 1000, 400, 14, 4, np.inf, 4, 4, 0.7, 2.0)
 LOOKS = (
     *QUICK,
-    Look(False, False, False, 0.8, 1000, 400, 14, 4, np.inf, 4, 4, 0.7, 2.0),
+    THOROUGH,
     Look(True, False, False, 0.7, 1000, 400, 14, 4, np.inf, 4, 4, 0.7, 2.0),
     Look(False, False, True, 1.0, STARTS, SURVIVORS, 10, 3, 1.25, 5, 2, 0.8, 2.0),
 )

@@ -16,7 +16,7 @@ from .beards import above_beard, template_above
 from .confidence import like_ears
 from .infant import infant_points, infant_space
 from .looking import FITTING, SIZE, TRIAL_MODES, lies, looked, run
-from .looks import LOOKS, PARTS, PLAIN, QUICK, SIZED, WHOLE
+from .looks import LOOKS, PARTS, PLAIN, QUICK, SIZED, THOROUGH, WHOLE
 from .shape_fit import TRIAL, NoFaceError, ShapeFit, fit_shape
 from .shape_space import ShapeSpace
 from .verdict import ODD, judged, likeness_of, misfit_of, share_of, weighed
@@ -64,7 +64,7 @@ def place_face(mesh: Mesh, reference: Head, space: ShapeSpace, unit_scales, any_
         if best and _is_face(look, best):
             if look.infant:
                 best = yield from portion(_or_turned_over(reference, best), high, 1.0)
-            elif best[0].bad > ODD:
+            elif best[0].bad > ODD and not look.above:  # a face above a beard is no infant's
                 best = yield from portion(or_infant(best), high, 1.0)
             _, scale, fit, _, of = best
             own = not any_size
@@ -134,13 +134,13 @@ def _begun_from(starts, reference, scale, target, space) -> Work:
         for k, start in enumerate(starts):
             part = (0.5 * (k + extra) / len(starts) for extra in (0, 1))
             trial = yield from run(fit_shape(few, target, start, TRIAL, every=3, size=SIZE), *part, FITTING)
-            trials.append((weighed(misfit_of(few, trial), likeness_of(reference, few, trial), LOOKS[-1].weigh), trial))
+            trials.append((weighed(misfit_of(few, trial), likeness_of(reference, few, trial), THOROUGH.weigh), trial))
         _, trial = min(trials, key=lambda t: t[0])
         work = fit_shape(space, target, trial.pose, coefficients=trial.coefficients, size=SIZE)
         fit = yield from run(work, 0.5, 1.0, FITTING)
     except NoFaceError:
         return None
-    return judged(reference, space, fit, LOOKS[-1].relief), scale, fit, target, space
+    return judged(reference, space, fit, THOROUGH.relief), scale, fit, target, space
 
 
 def _turned_over(space, fit):

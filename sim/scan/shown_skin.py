@@ -42,6 +42,8 @@ def shown_skin(points, colour, skin: Mesh, groups, landmarks, eyes, hidden) -> n
     skin : the head's, where the scan is, upright, facing -Y, with its ``groups`` of vertices, name -> (n,) 0..1
     landmarks : name -> (3,) mm; eyes : of the head, left and right; hidden : (n,) bool, covered skin, or None
     """
+    if not len(points):
+        return np.ones(0)
     at, mean, count = _cells(points, colour)
     light = np.log(np.maximum(mean, DARKEST))
     trust = np.ones(len(at))
