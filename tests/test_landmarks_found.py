@@ -321,7 +321,7 @@ def test_a_thorough_look_begins_with_the_places_most_like_a_face(reference, monk
     def size(look, pose):
         return round(pose.scale / look.size, 6)
 
-    for look, order in zip(placed_face.LOOKS, ([1.0, 3.0, 2.0], *([2.0, 1.0, 3.0],) * 3), strict=True):
+    for look, order in zip(placed_face.LOOKS, ([1.0, 3.0, 2.0], *([2.0, 1.0, 3.0],) * 4), strict=True):
         monkeypatch.setattr(looking, "search_poses", search)
         monkeypatch.setattr(looking, "fit_shape", fit)
         monkeypatch.setattr(looking, "misfit_of", lambda _, pose, look=look: places[size(look, pose)][0])
