@@ -3,7 +3,8 @@
 
 import numpy as np
 
-from headshop.sim.adapt.fit_sentence import fit_sentence, fitted_shares, invented
+from headshop.sim.adapt.fit_sentence import LEFT_OUT, fit_sentence, fitted_shares, invented
+from headshop.sim.adapt.scan_surface import NO_SKIN
 
 
 def test_the_sentence_names_what_was_invented(reference):
@@ -35,3 +36,7 @@ def test_a_little_data_is_said(reference):
     assert invented({"left ear": 0.3, "right ear": 0.2}) == ["most of both ears"]
     assert invented({"left ear": 0.3, "right ear": 0.0}) == ["most of the left ear", "right ear"]
     assert invented({"neck": 0.3, "nose": 0.9}) == ["most of the neck"]
+
+
+def test_all_that_may_be_left_out_has_a_name():
+    assert set(LEFT_OUT) == set(NO_SKIN)

@@ -93,6 +93,31 @@ def _coloured_scan(reference):
     return Mesh.from_triangles(skin.vertices, triangles, colour=to_srgb(linear).astype(np.float32))
 
 
+@pytest.fixture
+def made_of(bpy, reference, monkeypatch):
+    """``made_of(scan, name)`` -> the skin, with a small image, of a head that was made of a mesh."""
+    from headshop.headshop_addon import bridge, heads, scan_colour
+
+    monkeypatch.setattr(scan_colour, "SIZE", 96)
+
+    def make(scan, name="Ada"):
+        obj = bridge.mesh_to_object(scan, name + " Scan")
+        bpy.context.scene.collection.objects.link(obj)
+        heads.create_head(reference, name, obj)
+        (skin,) = (head for head in heads.find_heads() if head.name.startswith(name))
+        return skin
+
+    return make
+
+
+def _painted(skin):
+    """The image that a skin's material shows, and its pixels (k, 4)."""
+    (image,) = (node.image for node in skin.data.materials[0].node_tree.nodes if node.type == "TEX_IMAGE")
+    pixels = np.empty(len(image.pixels), dtype=np.float32)
+    image.pixels.foreach_get(pixels)
+    return image, pixels.reshape(-1, 4)
+
+
 def test_the_scans_colours_arrive_and_spread_where_it_has_none(reference):
     pytest.importorskip("bpy")
     from headshop.headshop_addon.scan_colour import ScanColour, vertex_colour
@@ -149,14 +174,10 @@ def test_what_is_not_trusted_gives_no_colour_and_does_not_hold_what_is_spread(re
     assert spread[skin.vertices[:, 0] < -10, 1].max() < 0.15
 
 
-def test_a_head_is_dressed_in_what_shows_skin(bpy, reference, monkeypatch):
-    from headshop.headshop_addon import bridge, heads, materials, scan_colour
+def test_a_head_is_dressed_in_what_shows_skin(reference, made_of, monkeypatch):
+    from headshop.headshop_addon import bridge, materials
 
-    monkeypatch.setattr(scan_colour, "SIZE", 96)
-    scan = bridge.mesh_to_object(_coloured_scan(reference), "Scan")
-    bpy.context.scene.collection.objects.link(scan)
-    heads.create_head(reference, "Ada", scan)
-    (skin,) = heads.find_heads()
+    skin = made_of(_coloured_scan(reference))
     bridge.write_attribute(skin.data, "hidden", reference.groups["scalp"] > 0.5)
     asked = []
 
@@ -168,10 +189,7 @@ def test_a_head_is_dressed_in_what_shows_skin(bpy, reference, monkeypatch):
     materials.dress_head(skin)
     count = len(reference.skin.vertices)
     assert asked == [(count, count, True, 2, int((reference.groups["scalp"] > 0.5).sum()))]
-    (image,) = [node.image for node in skin.data.materials[0].node_tree.nodes if node.type == "TEX_IMAGE"]
-    pixels = np.empty(len(image.pixels), dtype=np.float32)
-    image.pixels.foreach_get(pixels)
-    pixels = pixels.reshape(-1, 4)
+    _, pixels = _painted(skin)
     assert (pixels[:, 0] > pixels[:, 2] + 0.2).mean() < 0.02  # red, which is on the left
 
 
@@ -205,23 +223,15 @@ def test_a_scan_elsewhere_gives_no_colour(reference):
     assert vertex_colour(reference.skin, ScanColour(far), reference.groups["inner"]) is None
 
 
-def test_a_scan_wound_inside_out_gives_the_same_colours(bpy, reference, monkeypatch):
-    from headshop.headshop_addon import bridge, heads, materials, scan_colour
+def test_a_scan_wound_inside_out_gives_the_same_colours(reference, made_of):
+    from headshop.headshop_addon import materials
     from headshop.sim.mesh import Mesh
 
-    monkeypatch.setattr(scan_colour, "SIZE", 96)
-    scan = _coloured_scan(reference)
-    found = []
+    scan, found = _coloured_scan(reference), []
     for name, triangles in (("Ada", scan.triangles), ("Bea", scan.triangles[:, ::-1])):
-        mesh = Mesh.from_triangles(scan.vertices, triangles, colour=scan.colour)
-        obj = bridge.mesh_to_object(mesh, name + " Scan")
-        bpy.context.scene.collection.objects.link(obj)
-        heads.create_head(reference, name, obj)
-        (skin,) = (head for head in heads.find_heads() if head.name.startswith(name))
+        skin = made_of(Mesh.from_triangles(scan.vertices, triangles, colour=scan.colour), name)
         materials.dress_head(skin)
-        nodes = skin.data.materials[0].node_tree.nodes
-        (image,) = (node.image for node in nodes if node.type == "TEX_IMAGE")
-        found.append(np.array(image.pixels[:]))
+        found.append(_painted(skin)[1])
     np.testing.assert_allclose(*found, atol=0.02)
 
 
@@ -248,27 +258,19 @@ def test_a_scan_wound_inside_out_is_shown_outside_out(bpy, skin, reference, mirr
     np.testing.assert_allclose(*outward, atol=1e-3)
 
 
-def test_a_coloured_scan_gives_the_head_a_skin_of_its_own(bpy, reference, monkeypatch):
-    from headshop.headshop_addon import bridge, heads, materials, scan_colour
+def test_a_coloured_scan_gives_the_head_a_skin_of_its_own(bpy, reference, made_of):
+    from headshop.headshop_addon import bridge, materials
 
-    monkeypatch.setattr(scan_colour, "SIZE", 96)
-    scan = bridge.mesh_to_object(_coloured_scan(reference), "Scan")
-    bpy.context.scene.collection.objects.link(scan)
-    heads.create_head(reference, "Ada", scan)
-    (skin,) = heads.find_heads()
+    skin = made_of(_coloured_scan(reference))
     materials.dress_head(skin)
-    material = skin.data.materials[0]
-    (image,) = [node.image for node in material.node_tree.nodes if node.type == "TEX_IMAGE"]
+    material, (image, pixels) = skin.data.materials[0], _painted(skin)
     assert image.packed_file is not None, "the colours must travel with the file"
-    pixels = np.empty(len(image.pixels), dtype=np.float32)
-    image.pixels.foreach_get(pixels)
-    pixels = pixels.reshape(-1, 4)
     assert (pixels[:, 0] > pixels[:, 2] + 0.2).mean() > 0.15 and (pixels[:, 2] > pixels[:, 0] + 0.2).mean() > 0.15
     images = len(bpy.data.images)
     bridge.write_attribute(skin.data, "hidden", reference.skin.vertices[:, 0] > 0)  # as if hair covered all that is red
     materials.dress_head(skin)
     assert len(bpy.data.images) == images and skin.data.materials[0] == material
-    image.pixels.foreach_get(pixels.ravel())
+    _, pixels = _painted(skin)
     assert (pixels[:, 0] > pixels[:, 2] + 0.2).mean() < 0.03
 
 

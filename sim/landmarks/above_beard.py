@@ -45,11 +45,11 @@ def without_beards_lead(
     doubted = cost(space, fit, lips) > OFF or verdict.bad > BAD
     if not (above or shaggy or doubted and (is_rough or not rough)):
         return fit, None
-    blind = above_beard(space)
     try:
         rival = fit
         if not above:
-            rival = yield from run(fit_shape(blind, target, lies(space, fit), size=SIZE), 0.0, 0.6, FITTING)
+            work = fit_shape(above_beard(space), target, lies(space, fit), size=SIZE)
+            rival = yield from run(work, 0.0, 0.6, FITTING)
         off, nearer = cost(space, fit, lips), cost(space, rival, lips)
         if above or (is_rough and nearer < FURROW * off):
             seen = thick_beard(space, rival, target)

@@ -64,6 +64,11 @@ def above_beard(space: ShapeSpace) -> ShapeSpace:
     return replace(space, area=np.where(grows_beard(space), 0.0, space.area))
 
 
+def is_above_beard(space: ShapeSpace) -> bool:
+    """Whether that is one of `above_beard`."""
+    return not space.area.all()
+
+
 def template_above(space: ShapeSpace, template: np.ndarray) -> np.ndarray:
     """What of ``template`` (k, 3) mm, points of the reference's face, lies where no beard grows."""
     return template[~grows_beard(space)[cKDTree(space.points).query(template)[1]]]
@@ -86,7 +91,7 @@ def thick_beard(space: ShapeSpace, above: ShapeFit, target: Surface) -> Beard:
     zone, marks = grows_beard(space), space.landmarks(space.points)
     beyond = cKDTree(space.points[zone]).query(space.points)[0] < BEYOND
     beyond &= (np.abs(space.points[:, 0]) > BESIDE + BEYOND) & (space.ear < AWAY)
-    zone = zone | (beyond & ~lips_beside(space) & (space.points[:, 2] < marks["en_l"][2] - BEYOND))
+    zone = zone | (beyond & (space.points[:, 2] < marks["en_l"][2] - BEYOND))
     high, rough = heights(space, above, target, zone)
     some = zone & ((high > HIGH) | (rough > ROUGH))
     if some.any():

@@ -13,7 +13,7 @@ from ..mesh import Mesh
 from ..progress import Progress, Work, portion
 from ..scan.depth_jumps import depth_jumps
 from .above_beard import without_beards_lead
-from .beards import beard_over
+from .beards import beard_over, is_above_beard
 from .confidence import judge, judge_together, like_ears, sure_as_corners
 from .expression import fit_expression, line_of, meeting_lids, outline_of
 from .glasses import fit_without_glasses, glasses_seen
@@ -93,7 +93,7 @@ def _finding(mesh: Mesh, reference: Head | None, unit_scales, any_size: bool) ->
     placing = place_face(mesh, reference, space, unit_scales, any_size)
     scale, fit, target, space = yield from portion(placing, 0.05, 0.75)
     fit = yield from portion(with_likelier_ears(space, target, fit), 0.75, 0.77)
-    beard, above = None, not space.area.all()
+    beard, above = None, is_above_beard(space)
     space = shape_space(reference) if above else space
     if not space.of_infants:
         fit, beard = yield from portion(without_beards_lead(reference, space, target, fit, above), 0.77, 0.79)

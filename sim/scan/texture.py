@@ -8,9 +8,8 @@ from ..mesh import Mesh, vertex_normals
 #: Texels of a picture that are averaged along each side, at most: more would bleed over the borders of its islands.
 COARSEST = 4
 MOST_PARTS = 64  # into which the side of a triangle is cut
-SLENDER = (
-    1 / 3
-)  # of its longest side, that a triangle counts as wide at least, lest points lie far apart along slender ones
+#: Of its longest side, that a triangle counts as wide at least, lest points lie far apart along slender ones.
+SLENDER = 1 / 3
 
 
 def has_pictures(mesh: Mesh) -> bool:
