@@ -29,6 +29,8 @@ def studio(skin: bpy.types.Object, **stage):
     try:
         yield scene, set_stage(scene, skin, **stage)
     finally:
+        # What a renderer keeps for the next frame outlives its scene, and Blender reads it afterwards, out of freed memory.
+        scene.render.use_persistent_data = False
         bpy.data.scenes.remove(scene)
         for kind in _KINDS:
             blocks = getattr(bpy.data, kind)

@@ -2,6 +2,7 @@
 """Sheet and film: what is written, and that nothing of the artist's is touched."""
 
 import tempfile
+import weakref
 
 import numpy as np
 import pytest
@@ -83,6 +84,30 @@ def test_the_sheet_shows_a_head_its_anatomy_and_each_key(bpy, skin, tmp_path):
     for i, one in enumerate(pictures):
         for other in pictures[:i]:
             assert np.abs(one - other).mean() > 0.004, "two tiles show the same"
+
+
+def test_no_renderer_outlives_the_scene_it_drew(bpy, skin):
+    """It would keep a graph of the scene for a next frame, which Blender updates with the next thing that is deleted."""
+    from headshop.headshop_addon.pictures import render_picture
+    from headshop.headshop_addon.studio import studio
+
+    seen = []
+
+    class Renderer(bpy.types.RenderEngine):
+        bl_idname, bl_label = "HEADSHOP_TEST", "Test"
+
+        def render(self, graph):
+            seen.append(weakref.ref(self))
+
+    bpy.utils.register_class(Renderer)
+    try:
+        with studio(skin, width=32, height=32, samples=1) as (scene, _):
+            scene.render.engine = "HEADSHOP_TEST"
+            render_picture(scene)
+            assert seen[0]() is not None, "it is kept from one picture to the next"
+        assert seen[0]() is None
+    finally:
+        bpy.utils.unregister_class(Renderer)
 
 
 def test_a_sheet_given_up_leaves_nothing(bpy, skin, tmp_path):
