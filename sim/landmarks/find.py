@@ -16,6 +16,7 @@ from .above_beard import without_beards_lead
 from .beards import beard_over, is_above_beard
 from .confidence import judge, judge_together, like_ears, sure_as_corners
 from .expression import fit_expression, line_of, meeting_lids, outline_of
+from .fringe import fit_without_fringe, left_beside
 from .glasses import fit_without_glasses, glasses_seen
 from .infant import with_mouth_in_place
 from .looking import run
@@ -98,8 +99,15 @@ def _finding(mesh: Mesh, reference: Head | None, unit_scales, any_size: bool) ->
     if not space.of_infants:
         fit, beard = yield from portion(without_beards_lead(reference, space, target, fit, above), 0.77, 0.79)
         target = target.without(beard_over(space, beard, target))
-    fit, telling = yield from run(fit_without_glasses(space, target, fit), 0.79, 0.8, "Looking for glasses")
-    target = target.without(glasses_seen(space, telling, target))
+    haired, fringe = target, np.zeros(len(space.points), dtype=bool)
+    if not space.of_infants:
+        fit, fringe = yield from run(fit_without_fringe(space, target, fit), 0.79, 0.795, "Looking for hair")
+    under = hair_over(space, fit, target, fringe)
+    target = target.without(under)
+    fit, telling = yield from run(fit_without_glasses(space, target, fit), 0.795, 0.8, "Looking for glasses")
+    worn = glasses_seen(space, telling, target)
+    target = target.without(worn)
+    haired = left_beside(haired, under, worn) if under.any() else target
     scan = scan.moved(scan.vertices * scale)
     whole = space
     if beard is None:
@@ -108,18 +116,20 @@ def _finding(mesh: Mesh, reference: Head | None, unit_scales, any_size: bool) ->
         fit = yield from run(with_mouth_in_place(space, target, fit), 0.81, 0.82, "Looking for the mouth")
     misfit = misfit_of(space, fit)
     fit, shown = yield from run(fit_expression(space, target, fit, scan), 0.82, 0.88, "Looking at lips and lids")
-    hair = yield from run(fit_under_hair(space, target, fit, shown), 0.88, 0.9, "Looking for hair")
+    hair = yield from run(fit_under_hair(space, haired, fit, shown, fringe=fringe), 0.88, 0.9, "Looking for hair")
     fit = hair.fit
     positions = picked(space, fit, target)
     confidence, mid_air, missing = judge(space, fit, target, positions)
     skull = picked(space, hair.scalp, target)
-    positions |= {n: skull[n] for n in mid_air if n.partition("_")[0] in SKULL}
+    below = {n for n, corners in zip(space.names, space.corners, strict=True) if fringe[corners].any()}
+    positions |= {n: skull[n] for n in mid_air if n.partition("_")[0] in SKULL or n in below}
     positions = {n: p for n, p in positions.items() if n not in missing}
     confidence = {n: confidence[n] for n in positions}
     bare = target.without(hair_over(space, fit, target, hair.covered & ~in_face(space, fit, {}, 0.0)))
     seen = Mesh.from_triangles(bare.vertices, bare.triangles)
     other = yield from portion(weighed(seen, positions, confidence, reference, bare), 0.9, 1.0)
-    if telling or beard:  # over holes as wide as those a relaxed map tells less than the shape, over others as much
+    if telling or beard or fringe.any():
+        # Over holes as wide as those a relaxed map tells less than the shape, over others as much.
         other |= {n: positions[n] for n in mid_air}
     positions = better_of(positions, other, shown.parted or space is not whole, fit.pose.scale)
     lids = meeting_lids(space, fit, target, shown.shut) | shown.lids

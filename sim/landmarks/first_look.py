@@ -22,6 +22,7 @@ from .above_beard import without_beards_lead
 from .beards import OVER_SKIN, beard_over, picked_on
 from .confidence import in_mid_air
 from .expression import fit_expression
+from .fringe import fit_without_fringe, left_beside
 from .glasses import BEFORE_SKIN, fit_without_glasses, glasses_seen
 from .held_by_lips import held_by_lips
 from .hidden_skin import COVERED, TOLD, UNSEEN, hidden_skin, unseen_face, unseen_scalp, with_hidden_skin
@@ -32,7 +33,7 @@ from .picked import moved, picked
 from .pose_search import Pose
 from .shape_fit import NoFaceError, Told, fit_shape
 from .shape_space import shape_space
-from .under_hair import EAR, SKULL, fit_under_hair, hair_over, in_face
+from .under_hair import EAR, SKULL, fit_under_hair, hair_over, in_face, scalp_by_ears
 from .unseen_jaw import JAW, unseen_jaw, with_unseen_jaw
 
 LOOKING = "Looking at lids and lips"
@@ -45,11 +46,11 @@ FEWEST = 4  # landmarks that tell where the head is
 
 @dataclass(frozen=True, eq=False)
 class FirstLook:
-    """landmarks : name -> (3,) mm, those given, without those on a beard, and those of lids that are seen; lips : about where
-    their landmarks are if they are parted, if only a little, or None; target : the scan without what the lips hold, hair,
-    glasses and beards; left_out : how much of it that is, mm²; filled : with skin behind it, and where it lacks the scalp, as
-    that probably is; hidden (k,) : vertices of the reference's skin that make that up; guessed : name -> (3,) mm, about where
-    others are; laid : the same of those given that the face tells, where it has them itself."""
+    """landmarks : name -> (3,) mm, those given, without those on a beard or a fringe, and those of lids that are seen; lips :
+    about where their landmarks are if they are parted, if only a little, or None; target : the scan without what the lips
+    hold, hair, glasses and beards; left_out : how much of it that is, mm²; filled : with skin behind it, and where it lacks
+    the scalp, as that probably is; hidden (k,) : vertices of the reference's skin that make that up; guessed : name -> (3,) mm, about
+    where others are; laid : the same of those given that the face tells, where it has them itself."""
 
     landmarks: dict[str, np.ndarray]
     target: Surface
@@ -108,13 +109,22 @@ def first_look(
         if grown.any():
             on_beard, target = target.without(~grown), target.without(grown)
             coarse = target.coarser()
+        whole_hair, fringe = target, np.zeros(len(space.points), dtype=bool)
+        if "hair" in leave_out and not space.of_infants:
+            fit, fringe = yield from run(fit_without_fringe(space, coarse, fit), 0.53, 0.54, LOOKING)
+        fallen = hair_over(space, fit, target, fringe)
+        fallen_area = target.area[fallen].sum()
+        if fallen.any():
+            target = target.without(fallen)
+            coarse = target.coarser()
         if "glasses" in leave_out:
-            fit, telling = yield from run(fit_without_glasses(space, coarse, fit), 0.53, 0.55, LOOKING)
+            fit, telling = yield from run(fit_without_glasses(space, coarse, fit), 0.54, 0.55, LOOKING)
         worn = glasses_seen(space, telling, target)
         glasses, glasses_area = target.vertices[target.triangles[worn].ravel()], target.area[worn].sum()
         if worn.any():
             target = target.without(worn)
             coarse = target.coarser()
+        haired = left_beside(whole_hair, fallen, worn).coarser() if fallen.any() else coarse
         if not jaw_told and beard is None:
             fit, space = yield from run(with_unseen_jaw(space, coarse, fit), 0.55, 0.58, LOOKING)
         if space.of_infants:
@@ -123,7 +133,7 @@ def first_look(
         skull = [n for n in names if n.partition("_")[0] in SKULL and n not in found]
         off = in_mid_air(target, np.reshape([given[n] for n in skull], (-1, 3)))
         known = {n: given[n] for n in np.array(skull)[off]}
-        hair = yield from run(fit_under_hair(space, coarse, fit, shown, given, known), 0.9, 1.0, LOOKING)
+        hair = yield from run(fit_under_hair(space, haired, fit, shown, given, known, fringe), 0.9, 1.0, LOOKING)
     except NoFaceError:
         return FirstLook(given, whole, whole)
     landmarks = given | lids_told(space, fit, shown, coarse, given)
@@ -131,7 +141,8 @@ def first_look(
     lips = {name: laid[name] for name in MARKS} if shown.parted else None
     untold = (*UNTOLD, "sto") if shown.parted else UNTOLD
     laid, skull = space.landmarks(hair.fit.points), space.landmarks(hair.scalp.points)
-    laid |= {n: p for n, p in skull.items() if n.partition("_")[0] in SKULL}
+    fringed = {n for n, corners in zip(space.names, space.corners, strict=True) if fringe[corners].any()}
+    laid |= {n: p for n, p in skull.items() if n.partition("_")[0] in SKULL or n in fringed}
     places = picked(space, hair.fit, coarse)
     laid |= {n: p for n, p in places.items() if n.partition("_")[0] in EAR_MARKS}
     guessed = {n: p for n, p in laid.items() if n not in landmarks and n.partition("_")[0] not in untold}
@@ -142,6 +153,7 @@ def first_look(
     if "hair" in leave_out:
         covered |= hair.covered & ~in_face(space, hair.fit, given, BESIDE_FACE)
         covered |= hair.far & ~in_face(space, hair.fit, given, 0.0)
+    covered &= ~fringe
     shows = hair_over(space, hair.fit, target, covered)
     left = target.without(held | shows)
     hidden = hidden_skin(space, fit, target.vertices[target.triangles[held].ravel()], left)
@@ -158,10 +170,16 @@ def first_look(
     filled = with_hidden_skin(space, fit, under, filled, TOLD if chin else COVERED, chin)
     hidden |= under
     no_ear = space.ear < EAR  # ears take the reference's shape
-    filled = with_hidden_skin(space, hair.fit, covered & no_ear, filled)
+    if fallen.any():
+        hair_alone = whole_hair.without(~fallen)
+        forehead = fringe & no_ear & hidden_skin(space, hair.scalp, hair_alone.vertices, left, OVER_SKIN)
+        filled = with_hidden_skin(space, hair.scalp, forehead, filled)
+        hidden |= forehead
+        misled |= picked_on(space, hair.scalp, hair_alone, {n: given[n] for n in names if n in fringed})
+    filled = with_hidden_skin(space, scalp_by_ears(space, hair), covered & no_ear, filled)
     unseen = unseen_scalp(space, hair.scalp, left) & ~covered & (not kept)  # what lies far below hair is not unseen
     filled = with_hidden_skin(space, hair.scalp, unseen & no_ear, filled, UNSEEN)
-    areas = (target.area[held].sum(), target.area[shows].sum(), glasses_area, beard_area)
+    areas = (target.area[held].sum(), target.area[shows].sum() + fallen_area, glasses_area, beard_area)
     out = dict(zip(KINDS, map(float, areas), strict=True))
     own = {n: places[n] for n in clear if n in places}
     landmarks = {n: p for n, p in landmarks.items() if n not in misled}
