@@ -49,8 +49,8 @@ class FirstLook:
     """landmarks : name -> (3,) mm, those given, without those on a beard or a fringe, and those of lids that are seen; lips :
     about where their landmarks are if they are parted, if only a little, or None; target : the scan without what the lips
     hold, hair, glasses and beards; left_out : how much of it that is, mm²; filled : with skin behind it, and where it lacks
-    the scalp, as that probably is; hidden (k,) : vertices of the reference's skin that make that up; guessed : name -> (3,) mm, about
-    where others are; laid : the same of those given that the face tells, where it has them itself."""
+    the scalp, as that probably is; hidden (k,) : vertices of the reference's skin that make that up; guessed : name -> (3,)
+    mm, about where others are; laid : the same of those given that the face tells, where it has them itself."""
 
     landmarks: dict[str, np.ndarray]
     target: Surface
