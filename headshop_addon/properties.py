@@ -57,7 +57,7 @@ NO_SKIN = (
     ("DEPTH_JUMPS", "Depth Jumps", "Leave out what a depth map has stretched from the head to the wall behind it"),
     ("FLAT_ENDS", "Flat Ends", "Leave out where tomography stops or a bust stands on its base"),
     ("HELD_BY_LIPS", "Held by Lips", "Leave out what the lips hold, such as a breathing tube"),
-    ("HAIR", "Hair", "Leave out hair of the head; the scalp is invented below it"),
+    ("HAIR", "Hair", "Leave out hair of the head, a fringe or a cap; scalp and forehead are invented below it"),
     ("GLASSES", "Glasses", "Leave out glasses; what they hide is invented"),
     ("BEARD", "Beard", "Leave out a beard; chin and cheeks are invented below it"),
 )
