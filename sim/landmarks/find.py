@@ -121,8 +121,7 @@ def _finding(mesh: Mesh, reference: Head | None, unit_scales, any_size: bool) ->
     positions = picked(space, fit, target)
     confidence, mid_air, missing = judge(space, fit, target, positions)
     skull = picked(space, hair.scalp, target)
-    below = {n for n, corners in zip(space.names, space.corners, strict=True) if fringe[corners].any()}
-    positions |= {n: skull[n] for n in mid_air if n.partition("_")[0] in SKULL or n in below}
+    positions |= {n: skull[n] for n in mid_air if n.partition("_")[0] in SKULL}
     positions = {n: p for n, p in positions.items() if n not in missing}
     confidence = {n: confidence[n] for n in positions}
     bare = target.without(hair_over(space, fit, target, hair.covered & ~in_face(space, fit, {}, 0.0)))

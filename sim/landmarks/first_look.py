@@ -141,8 +141,7 @@ def first_look(
     lips = {name: laid[name] for name in MARKS} if shown.parted else None
     untold = (*UNTOLD, "sto") if shown.parted else UNTOLD
     laid, skull = space.landmarks(hair.fit.points), space.landmarks(hair.scalp.points)
-    fringed = {n for n, corners in zip(space.names, space.corners, strict=True) if fringe[corners].any()}
-    laid |= {n: p for n, p in skull.items() if n.partition("_")[0] in SKULL or n in fringed}
+    laid |= {n: p for n, p in skull.items() if n.partition("_")[0] in SKULL}
     places = picked(space, hair.fit, coarse)
     laid |= {n: p for n, p in places.items() if n.partition("_")[0] in EAR_MARKS}
     guessed = {n: p for n, p in laid.items() if n not in landmarks and n.partition("_")[0] not in untold}
@@ -175,6 +174,7 @@ def first_look(
         forehead = fringe & no_ear & hidden_skin(space, hair.scalp, hair_alone.vertices, left, OVER_SKIN)
         filled = with_hidden_skin(space, hair.scalp, forehead, filled)
         hidden |= forehead
+        fringed = {n for n, corners in zip(space.names, space.corners, strict=True) if fringe[corners].any()}
         misled |= picked_on(space, hair.scalp, hair_alone, {n: given[n] for n in names if n in fringed})
     filled = with_hidden_skin(space, scalp_by_ears(space, hair), covered & no_ear, filled)
     unseen = unseen_scalp(space, hair.scalp, left) & ~covered & (not kept)  # what lies far below hair is not unseen
