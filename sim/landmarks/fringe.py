@@ -24,8 +24,8 @@ EAR = 0.05  # of `ShapeSpace.ear`, from which on skin is an ear
 #: rad by which normals vary over a fringe, at least, and that in terms of the cheeks'; mm by which heights do.
 ROUGH, ROUGHER, RAGGED = 0.2, 1.5, 0.8
 #: Share of the low forehead that is so: of four fringes .46 and more, under caps and a headband .43 and more, in a hood .32, of
-#: one man whose hair grows down to a brow .48 and .20; of a scan of 3,000 triangles .12; of 23 others, noisy and real ones among
-#: them, none at all.
+#: one man whose hair grows down to a brow .48 and .20; of a scan of 3,000 triangles .12; of 23 others, noisy and real ones
+#: among them, none at all.
 SHARE = 0.25
 HIGH = 6.0  # mm off the head laid on the rest, from which on it is fringe whether rough or not
 MOST = 0.4  # of what lies about a point of the skin, from which on it lies under a fringe
