@@ -15,12 +15,13 @@ from headshop.sim.landmarks.find import find_landmarks
 from headshop.sim.landmarks.first_look import first_look
 from headshop.sim.landmarks.fringe import fit_without_fringe, fringe_zone, has_fringe, left_beside
 from headshop.sim.landmarks.pose_search import Pose
-from headshop.sim.landmarks.shape_fit import ShapeFit
+from headshop.sim.landmarks.shape_fit import Expression, ShapeFit
 from headshop.sim.landmarks.shape_space import shape_space
 from headshop.sim.landmarks.under_hair import (
     UnderHair,
     about_ears,
     ear_found,
+    fit_under_hair,
     hair_over,
     in_face,
     scalp_by_ears,
@@ -236,6 +237,20 @@ def test_below_thick_hair_a_usual_skull_is_found(reference):
     crown = look.filled.vertices[look.filled.vertices[:, 2] > truth["t_l"][2] + 60]
     off = Surface(whole, reference.skin.triangles).closest(crown, 60.0).distance
     assert off.mean() < 0.25 * THICK
+
+
+def test_smooth_hair_behind_rough_hair_is_hair_where_it_stands_off(reference, laid):
+    space = shape_space(reference)
+    behind = space.landmarks(space.points)["t_l"][1] + 30
+
+    def combed_back(points):
+        return np.where(points[:, 1] < behind, falling(points), 8.0)
+
+    scan, whole, _ = grown(reference, combed_back, high=0.0)
+    hair = finish(fit_under_hair(space, surface_of(scan), laid(space, whole[space.vertices]), Expression()))
+    # Told by roughness alone: .17 of it.
+    assert hair.covered[space.hairy & (space.points[:, 1] > behind + 10)].mean() > 0.4
+    assert not hair.covered[(space.face > 0.9) & (space.points[:, 2] < 30)].any()
 
 
 @pytest.fixture(scope="module")
