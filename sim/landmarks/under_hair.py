@@ -47,7 +47,7 @@ OFF = 4.0  # mm by which hair stands off there
 #: Rounds of a fit that tells of the scalp, as in `shape_fit.SCHEDULE`. What a face has of its own to a millimetre tells nothing
 #: of the skull behind, and a fit that explains it bends that: given the faces of seven heads and a mannequin, such a fit was
 #: 14.1 mm off their skulls (95th percentile), this one is 7.4; given nine faces of ICT-FaceKit, 9.1 and 9.7. Under hair of 5 to
-#: 28 mm made for 13 people of it, this one is 1.7 mm off their scalps on average, such a fit 4.7.
+#: 28 mm made for 14 people of it, this one is 1.7 mm off their scalps on average, such a fit 4.9.
 LOOSE = ((1.0, 8.0, 2.5, 4.5),) * 6
 #: How much skin that expressions move tells of the skull behind a face whose lips are parted. Six smiles of ICT-FaceKit were
 #: 12.8 mm off their unseen skulls with all of it (95th percentile), 11.0 with so little.
