@@ -68,17 +68,17 @@ def in_mid_air(target: Surface, places) -> np.ndarray:
     return (target.closest(places).distance > MID_AIR) | beyond(cuts_of(target), places)
 
 
-def judge_together(positions, confidence, mid_air, rest, shown: Expression, like_ears) -> dict[str, float]:
+def judge_together(positions, confidence, mid_air, rest, shown: Expression, hidden) -> dict[str, float]:
     """Confidence with those lowered that only look sure one by one: on ears under hair, of which few landmarks can be
     seen, on lids that nearly meet although the eye is not ``shown`` shut, and on lids that had to be held open.
 
-    rest : the reference's own landmarks, name -> mm; like_ears : see the function `like_ears`
+    rest : the reference's own landmarks, name -> mm; hidden : the sides of ears that are not seen
     """
     out = dict(confidence)
     for side in ("l", "r"):
         ear = [f"{n}_{side}" for n in EAR_MARKS if f"{n}_{side}" in out]
         marks = sum(out[n] >= SURE and n not in mid_air for n in ear)
-        weak = marks < SOME_MARKS or like_ears[side] < LIKE_AN_EAR
+        weak = marks < SOME_MARKS or side in hidden
         lids = [f"{n}_{side}" for n in ("ps", "pi", "en", "ex")]
         slit = side not in shown.shut and all(n in positions for n in lids)
         slit = slit and (shown.wide or _opening(positions, lids) < SLIT * _opening(rest, lids))

@@ -14,7 +14,7 @@ from ..progress import Progress, Work, portion
 from ..scan.depth_jumps import depth_jumps
 from .above_beard import without_beards_lead
 from .beards import beard_over, is_above_beard
-from .confidence import judge, judge_together, like_ears, sure_as_corners
+from .confidence import judge, judge_together, sure_as_corners
 from .expression import fit_expression, line_of, meeting_lids, outline_of
 from .fringe import fit_without_fringe, left_beside
 from .glasses import fit_without_glasses, glasses_seen
@@ -25,7 +25,7 @@ from .placed_face import place_face, with_likelier_ears
 from .pose_search import LOOKING
 from .shape_space import shape_space
 from .sure import SURE
-from .under_hair import SKULL, fit_under_hair, hair_over, in_face
+from .under_hair import fit_under_hair, hair_over, in_face
 from .unseen_jaw import with_unseen_jaw
 from .verdict import misfit_of
 
@@ -121,7 +121,7 @@ def _finding(mesh: Mesh, reference: Head | None, unit_scales, any_size: bool) ->
     positions = picked(space, fit, target)
     confidence, mid_air, missing = judge(space, fit, target, positions)
     skull = picked(space, hair.scalp, target)
-    positions |= {n: skull[n] for n in mid_air if n.partition("_")[0] in SKULL}
+    positions |= {n: p for n, p in skull.items() if hair.told_by_scalp(n, n in mid_air)}
     positions = {n: p for n, p in positions.items() if n not in missing}
     confidence = {n: confidence[n] for n in positions}
     bare = target.without(hair_over(space, fit, target, hair.covered & ~in_face(space, fit, {}, 0.0)))
@@ -141,7 +141,7 @@ def _finding(mesh: Mesh, reference: Head | None, unit_scales, any_size: bool) ->
         positions |= {n: p for n, p in mouth.marks.items() if n in positions}
         mid_air += ("sto",) if shown.parted and "sto" in positions and "sto" not in mid_air else ()
     rest = reference.landmark_positions()
-    confidence = judge_together(positions, confidence, mid_air, rest, shown, like_ears(space, fit, target))
+    confidence = judge_together(positions, confidence, mid_air, rest, shown, hair.hidden)
     return FoundLandmarks(positions, confidence, mid_air, missing, scale, misfit)
 
 

@@ -24,8 +24,9 @@ from .confidence import in_mid_air
 from .expression import fit_expression
 from .fringe import fit_without_fringe, left_beside
 from .glasses import BEFORE_SKIN, fit_without_glasses, glasses_seen
+from .hair_rim import rim_of_hair
 from .held_by_lips import held_by_lips
-from .hidden_skin import COVERED, TOLD, UNSEEN, hidden_skin, unseen_face, unseen_scalp, with_hidden_skin
+from .hidden_skin import COVERED, EARLESS, TOLD, UNSEEN, hidden_skin, unseen_face, unseen_scalp, with_hidden_skin
 from .infant import likelier_space, with_mouth_in_place
 from .lids_told import lids_told
 from .looking import facing_out, run
@@ -33,7 +34,7 @@ from .picked import moved, picked
 from .pose_search import Pose
 from .shape_fit import NoFaceError, Told, fit_shape
 from .shape_space import shape_space
-from .under_hair import EAR, SKULL, fit_under_hair, hair_over, in_face, scalp_by_ears
+from .under_hair import EAR, SKULL, fit_under_hair, hair_over, in_face, scalp_by_face
 from .unseen_jaw import JAW, unseen_jaw, with_unseen_jaw
 
 LOOKING = "Looking at lids and lips"
@@ -140,10 +141,9 @@ def first_look(
     laid = space.landmarks(fit.points)
     lips = {name: laid[name] for name in MARKS} if shown.parted else None
     untold = (*UNTOLD, "sto") if shown.parted else UNTOLD
-    laid, skull = space.landmarks(hair.fit.points), space.landmarks(hair.scalp.points)
-    laid |= {n: p for n, p in skull.items() if n.partition("_")[0] in SKULL}
-    places = picked(space, hair.fit, coarse)
+    places, laid = picked(space, hair.fit, coarse), space.landmarks(hair.fit.points)
     laid |= {n: p for n, p in places.items() if n.partition("_")[0] in EAR_MARKS}
+    laid |= {n: p for n, p in space.landmarks(hair.scalp.points).items() if hair.told_by_scalp(n)}
     guessed = {n: p for n, p in laid.items() if n not in landmarks and n.partition("_")[0] not in untold}
     held, covered = (np.zeros(len(each), dtype=bool) for each in (target.triangles, space.points))
     kept = "hair" not in leave_out and hair.covered.any()
@@ -154,6 +154,11 @@ def first_look(
         covered |= hair.far & ~in_face(space, hair.fit, given, 0.0)
     covered &= ~fringe
     shows = hair_over(space, hair.fit, target, covered)
+    if "hair" in leave_out:
+        probably = covered | hair.covered
+        rising, rim = rim_of_hair(space, hair.scalp, target, probably, covered, fringe | (space.ear > EARLESS), given)
+        shows |= rising
+        covered |= rim
     left = target.without(held | shows)
     hidden = hidden_skin(space, fit, target.vertices[target.triangles[held].ravel()], left)
     hidden |= hidden_skin(space, fit, glasses, left, BEFORE_SKIN)
@@ -176,7 +181,7 @@ def first_look(
         hidden |= forehead
         fringed = {n for n, corners in zip(space.names, space.corners, strict=True) if fringe[corners].any()}
         misled |= picked_on(space, hair.scalp, hair_alone, {n: given[n] for n in names if n in fringed})
-    filled = with_hidden_skin(space, scalp_by_ears(space, hair), covered & no_ear, filled)
+    filled = with_hidden_skin(space, scalp_by_face(space, hair, covered, given), covered & no_ear, filled)
     unseen = unseen_scalp(space, hair.scalp, left) & ~covered & (not kept)  # what lies far below hair is not unseen
     filled = with_hidden_skin(space, hair.scalp, unseen & no_ear, filled, UNSEEN)
     areas = (target.area[held].sum(), target.area[shows].sum() + fallen_area, glasses_area, beard_area)

@@ -91,8 +91,14 @@ def with_hidden_skin(
         )
         off = np.r_[off, np.einsum("ij,ij->i", np.array(list(picks.values())) - laid, across)]
         there = np.concatenate([there, picked])
-    system = alike(there, there, together, ALIKE)
-    system[np.diag_indices_from(system)] += (ROUGH / spread) ** 2
-    out = alike(space.points[used], there, together, ALIKE) @ cho_solve(cho_factor(system), off)
+    out = likeliest_heights(there, off, space.points[used], spread, together)
     points = fit.points[used] + out[:, None] * normals[used]
     return left.beside(points, corners.reshape(-1, 3))
+
+
+def likeliest_heights(there, off, places, spread: float, together: float) -> np.ndarray:
+    """(k,) mm: how far a scan most likely stands off at ``places`` (k, 3) mm on the reference, if it does by ``off`` (j,) at
+    ``there`` (j, 3) mm. spread, together : as in `COVERED`."""
+    system = alike(there, there, together, ALIKE)
+    system[np.diag_indices_from(system)] += (ROUGH / spread) ** 2
+    return alike(places, there, together, ALIKE) @ cho_solve(cho_factor(system), off)

@@ -186,6 +186,8 @@ def fit_shape(
             pull[6] -= prior[6] * np.log(scale / space.size)
         system[np.diag_indices_from(system)] += prior
         pull[7:] += prior[7:] * usual
+        system[7:, 7:] += space.beside[0]
+        pull[7:] += space.beside[1]
         if not expression.parted:
             system[7:, 7:] += space.seal
         for side, form in space.lids.items():
