@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Hair: thick or rough, it takes neither ears nor the crown with it, and the scalp below it is invented."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.sparse import csr_matrix, identity, vstack
@@ -15,7 +17,7 @@ from headshop.sim.landmarks.find import find_landmarks
 from headshop.sim.landmarks.first_look import first_look
 from headshop.sim.landmarks.fringe import fit_without_fringe, fringe_zone, has_fringe, left_beside
 from headshop.sim.landmarks.pose_search import Pose
-from headshop.sim.landmarks.shape_fit import Expression, ShapeFit
+from headshop.sim.landmarks.shape_fit import CHANGE, REST, Expression, ShapeFit, fit_shape
 from headshop.sim.landmarks.shape_space import shape_space
 from headshop.sim.landmarks.under_hair import (
     UnderHair,
@@ -391,7 +393,7 @@ def test_ears_that_nothing_tells_of_lie_farther_back_and_lower_than_the_referenc
     space = shape_space(reference)
     at = {n: k for k, n in enumerate(space.names)}
     for used in (space, space.reduced(60)):
-        form, pull = used.beside
+        form, pull = (sum(each) for each in zip(*used.beside.values(), strict=True))
         system = np.eye(len(pull)) + form
         usual = np.linalg.solve(system, pull)
         for side in "lr":
@@ -404,6 +406,29 @@ def test_ears_that_nothing_tells_of_lie_farther_back_and_lower_than_the_referenc
             _, back, up = apart @ usual
             assert 1.0 < back < 2.5 and -2.5 < up < -1.0
             assert 3 < varies[1] < 4.5 and 1.8 < varies[2] < 3
+
+
+@pytest.mark.parametrize("missing", ["", "l", "lr"])
+def test_what_is_expected_of_ears_counts_where_they_are_not_seen(reference, missing):
+    """Cut away or known to be under hair; those that are seen lie where they are."""
+    space = shape_space(reference)
+    strict = replace(space, beside={side: (10 * form, 10 * pull) for side, (form, pull) in space.beside.items()})
+    at, ear = space.points, space.ear > 0.2
+    gone = ear & np.isin(np.where(at[:, 0] > 0, "l", "r"), list(missing))
+    whole = Surface(at, space.triangles)
+    cut, hair = whole.without(gone[space.triangles].any(axis=1)), gone & ear
+    pose = Pose(1.0, np.eye(3), np.zeros(3), 0.0)
+
+    def moved(scan, hair=None):
+        fits = [
+            finish(fit_shape(each, scan, pose, CHANGE, None, 1, REST, None, hair)).points for each in (space, strict)
+        ]
+        return {side: np.abs(fits[1] - fits[0])[ear & ((at[:, 0] > 0) == (side == "l"))].max() for side in "lr"}
+
+    for off in (moved(cut), moved(whole, hair)):
+        for side in "lr":
+            assert (off[side] > 0.3) == (side in missing), off
+        assert missing or max(off.values()) == 0
 
 
 def test_ears_are_seen_where_they_are_expected(reference, laid):

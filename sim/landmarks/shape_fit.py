@@ -42,6 +42,7 @@ STANDS_OFF = 35.0  # mm: so far hair may
 SEEN_DEEP = (13.0, 18.0)
 PATCH = 40.0  # mm²: so much of the surface says one thing
 TOLD = 1.0  # mm by which a place that is told may be wrong
+EAR_SEEN = 0.2  # share of an ear that finds the scan: from there on that tells where the ear is
 TILT = 0.05  # rad of turn, and fraction of size, that count as much as 1 standard deviation
 
 
@@ -141,6 +142,8 @@ def fit_shape(
     hairy = space.hairy if hair is None or hair.any() else np.zeros_like(space.hairy)
     hairy = hairy if hair is None else hairy | hair
     area = space.area / PATCH * np.where(hairy, HAIR, 1.0)
+    bare = looking if hair is None else looking[~hair[looking]]
+    ears = {side: bare[(space.ear[bare] > 0.5) & ((space.points[bare, 0] > 0) == (side == "l"))] for side in "lr"}
     for done, (variance, reach, width, noise) in enumerate(rounds):
         shaped = space.shaped(coefficients)
         points = scale * shaped @ turn.T + shift
@@ -186,8 +189,11 @@ def fit_shape(
             pull[6] -= prior[6] * np.log(scale / space.size)
         system[np.diag_indices_from(system)] += prior
         pull[7:] += prior[7:] * usual
-        system[7:, 7:] += space.beside[0]
-        pull[7:] += space.beside[1]
+        for side, (form, way) in space.beside.items():
+            seen = (trust[ears[side]] > 0).sum() / max(len(ears[side]), 1)
+            unseen = max(1 - seen / EAR_SEEN, 0)
+            system[7:, 7:] += unseen * form
+            pull[7:] += unseen * way
         if not expression.parted:
             system[7:, 7:] += space.seal
         for side, form in space.lids.items():

@@ -58,7 +58,8 @@ class ShapeSpace:
     points (n, 3) mm : outer skin of the reference, as drawn, with the likeliest crown
     modes (n, 3, m) mm : displacement for one standard deviation of each coefficient
     seal (m, m) : quadratic form of lips that part, in standard deviations: small where the mouth is closed
-    beside : quadratic form (m, m) of ears that lie elsewhere beside the eyes, and (m,) its pull to where they most likely lie
+    beside : side -> quadratic form (m, m) of an ear that lies elsewhere beside the eye, and (m,) its pull to where it most
+        likely lies
     shut : side -> (m,) coefficients that shut that eye
     lids : side -> (m, m), quadratic form of how far that eye is shut
     parted (m,) : coefficients that open the mouth
@@ -76,7 +77,7 @@ class ShapeSpace:
     points: np.ndarray
     modes: np.ndarray
     seal: np.ndarray
-    beside: tuple[np.ndarray, np.ndarray]
+    beside: dict[str, tuple[np.ndarray, np.ndarray]]
     shut: dict[str, np.ndarray]
     lids: dict[str, np.ndarray]
     parted: np.ndarray
@@ -109,7 +110,7 @@ class ShapeSpace:
             self,
             modes=self.modes[:, :, :count],
             seal=self.seal[:count, :count],
-            beside=(self.beside[0][:count, :count], self.beside[1][:count]),
+            beside={side: (form[:count, :count], pull[:count]) for side, (form, pull) in self.beside.items()},
             shut=shut,
             lids=lids,
             parted=self.parted[:count],
@@ -221,9 +222,11 @@ def _lips(points, upper, lower):
 
 def _beside_eyes(riding):
     """`ShapeSpace.beside` where landmarks ride on the modes so: name -> (3, m)."""
-    off = np.array([(riding[f"t_{side}"] - riding[f"ex_{side}"])[1:] for side in "lr"]) / np.array(EARS_VARY)[:, None]
-    off = off.reshape(4, -1) / np.sqrt(2)  # both ears tell of one thing
-    return off.T @ off, off.T @ np.tile(np.divide(EARS, EARS_VARY), 2) / np.sqrt(2)
+    out = {}
+    for side in "lr":
+        off = (riding[f"t_{side}"] - riding[f"ex_{side}"])[1:] / np.array(EARS_VARY)[:, None] / np.sqrt(2)
+        out[side] = off.T @ off, off.T @ np.divide(EARS, EARS_VARY) / np.sqrt(2)  # both ears tell of one thing
+    return out
 
 
 def _smooth(points, reach, sd, where=None):
