@@ -38,19 +38,28 @@ def finer(triangles, fields):
     return triangles, np.concatenate([fields, fields[side].mean(axis=1)])
 
 
-def looked_at(space, hair, fit, rise, where=None, given=None, bare=None):
+def looked_at(space, hair, fit, rise, where=None, given=None, bare=None, strands=None):
     """What `rim_of_hair` says of the reference's skin with 12 mm of hair, and ``rise`` mm higher ``where`` (n,) bool, or
-    everywhere: the share of what rises so of a scan that is taken for hair, and the points (n,) bool of the skin below."""
+    everywhere: the share of what rises so of a scan that is taken for hair, and the points (n,) bool of the skin below.
+
+    strands : (k, 3) -> (k,) bool, which of such places rise; then the share of what does not is told as well
+    """
     triangles, fields = space.triangles, np.c_[space.points, vertex_normals(space.points, space.triangles)]
     for _ in range(2):
         triangles, fields = finer(triangles, fields)
     points, normals = fields[:, :3], fields[:, 3:]
     nearest = cKDTree(space.points).query(points)[1]
-    high = np.where(hair[nearest], 12.0, rise if where is None else rise * where[nearest])
+    rises = np.ones(len(points), dtype=bool) if where is None else where[nearest]
+    step = rises if strands is None else rises & strands(points)
+    high = np.where(hair[nearest], 12.0, rise * step)
     scan = Surface(points + high[:, None] * normals, triangles)
     bare = space.ear > EARLESS if bare is None else bare
     rising, below = rim_of_hair(space, fit, scan, hair, hair, bare, given or {})
-    return rising[(high[triangles] == rise).all(axis=1)].mean(), below
+    up, flat = (
+        (step == does)[triangles].all(axis=1) & (rises & ~hair[nearest])[triangles].all(axis=1)
+        for does in (True, False)
+    )
+    return (rising[up].mean(), below) if strands is None else (rising[up].mean(), rising[flat].mean(), below)
 
 
 def beside(space, hair):
@@ -75,6 +84,20 @@ def test_within_the_outline_it_takes_a_higher_step(space, hair, laid):
     rim = beside(space, hair) & in_face(space, fit, {}, BESIDE)
     rising, below = looked_at(space, hair, fit, 9.0, rim)
     assert below[rim].mean() > 0.7 and rising > 0.8
+
+
+@pytest.mark.parametrize("most", [True, False])
+def test_what_lies_between_strands_goes_with_them_where_those_are_most_of_it(space, hair, laid, most):
+    fit = laid(space, space.points)
+    rim = beside(space, hair) & ~in_face(space, fit, {}, BESIDE)
+    least = -0.5 if most else 0.75  # of waves 14 mm long
+
+    def strands(points):
+        return np.sin(points[:, 2] * 2 * np.pi / 14) > least
+
+    up, between, below = looked_at(space, hair, fit, 4.0, rim, strands=strands)
+    assert up > 0.85 and (between > 0.7) == most, (up, between)
+    assert (below[rim].mean() > 0.7) == most
 
 
 def test_skin_goes_on_beside_hair_as_it_lies_before_it(space, hair, laid):
