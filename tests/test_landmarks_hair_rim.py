@@ -86,18 +86,22 @@ def test_within_the_outline_it_takes_a_higher_step(space, hair, laid):
     assert below[rim].mean() > 0.7 and rising > 0.8
 
 
-@pytest.mark.parametrize("most", [True, False])
-def test_what_lies_between_strands_goes_with_them_where_those_are_most_of_it(space, hair, laid, most):
+def test_what_lies_between_strands_goes_with_them_where_those_are_most_of_it(space, hair, laid):
+    """And single ones go alone."""
     fit = laid(space, space.points)
     rim = beside(space, hair) & ~in_face(space, fit, {}, BESIDE)
-    least = -0.5 if most else 0.75  # of waves 14 mm long
 
-    def strands(points):
-        return np.sin(points[:, 2] * 2 * np.pi / 14) > least
+    def dense(points):
+        return np.sin(points[:, 2] * 2 * np.pi / 14) > -0.5
 
-    up, between, below = looked_at(space, hair, fit, 4.0, rim, strands=strands)
-    assert up > 0.85 and (between > 0.7) == most, (up, between)
-    assert (below[rim].mean() > 0.7) == most
+    def single(points):  # between points of the skin
+        first, second = cKDTree(space.points).query(points, 2)[0].T
+        return second - first < 2.0
+
+    up, between, below = looked_at(space, hair, fit, 4.0, rim, strands=dense)
+    assert up > 0.85 and between > 0.7 and below[rim].mean() > 0.7
+    up, between, below = looked_at(space, hair, fit, 1.45, rim, strands=single)
+    assert up > 0.4 and between < 0.1 and not below[rim].any()
 
 
 def test_skin_goes_on_beside_hair_as_it_lies_before_it(space, hair, laid):
