@@ -177,6 +177,17 @@ def test_hair_is_left_out_and_the_face_is_not(kind, reference, request):
     assert kept[off > 0.8 * SHORT].mean() < 0.3  # hair
 
 
+def test_little_of_the_step_where_hair_begins_is_taken_for_forehead(reference):
+    """It became bumps. By the outline of the face alone a quarter of what stands off by more than 6 mm would stay."""
+    scan, whole, truth = grown(reference, shag, high=0.0)
+    scan = surface_of(scan)
+    look = finish(first_look(reference, scan, of_face(truth)))
+    off = Surface(whole, reference.skin.triangles).closest(scan.vertices, 60.0).distance
+    kept = np.isin(np.arange(len(off)), cKDTree(scan.vertices).query(look.target.vertices)[1])
+    front = (scan.vertices[:, 1] < truth["t_l"][1] - 10) & (scan.vertices[:, 2] > truth["g"][2])
+    assert kept[front & (off > 6)].mean() < 0.08 and kept[front & (off < 0.1)].mean() > 0.98
+
+
 def test_a_picked_back_of_the_head_is_heeded_where_hair_is_seen_elsewhere(reference, shaggy):
     scan, _, truth = shaggy
     behind = truth["t_l"][1] + 40

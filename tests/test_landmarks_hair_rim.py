@@ -6,11 +6,14 @@ import pytest
 from scipy.spatial import cKDTree
 
 from headshop.sim.adapt.closest import Surface
+from headshop.sim.anatomy.landmark_names import SKIN
+from headshop.sim.landmarks import first_look as first
 from headshop.sim.landmarks.hair_rim import BESIDE, RIM, rim_of_hair
 from headshop.sim.landmarks.hidden_skin import EARLESS, likeliest_heights
 from headshop.sim.landmarks.shape_space import shape_space
 from headshop.sim.landmarks.under_hair import in_face
 from headshop.sim.mesh import vertex_normals
+from headshop.sim.progress import finish
 
 HIGHEST = 40.0  # mm above the brows from which on there is hair
 
@@ -131,6 +134,28 @@ def test_landmarks_tell_where_the_face_ends(space, hair, laid):
     for picked, least, most in ((-40.0, 0.7, 1.0), (15.0, 0.0, 0.0)):
         below = looked_at(space, hair, fit, 3.0, rim, {"tr": place + [0.0, 0.0, picked]})[1]
         assert least <= below[rim].mean() <= most
+
+
+def test_what_rises_to_hair_is_left_out_of_a_scan_and_filled_in(reference, space, monkeypatch):
+    given = {n: p for n, p in reference.landmark_positions().items() if n in SKIN and n not in ("v", "op")}
+    scan = Surface(space.points, space.triangles)
+    place = space.points[cKDTree(space.points).query(given["ft_l"])[1]]
+    patch = np.linalg.norm(space.points - place, axis=1) < 20
+    asked = []
+
+    def rim(told, fit, target, hair, out, bare, marks):
+        asked.append((bare, marks))
+        near = np.linalg.norm(target.vertices[target.triangles] - place, axis=2).max(axis=1) < 20
+        return near, patch
+
+    monkeypatch.setattr(first, "rim_of_hair", rim)
+    look = finish(first.first_look(reference, scan, given))
+    assert look.target.closest(place[None], 60.0).distance[0] > 5 > 2 > look.filled.closest(place[None]).distance[0]
+    assert set(space.vertices[patch]) <= set(look.hidden) and look.left_out["hair"] > 500
+    bare, marks = asked[0]
+    assert bare[space.ear > 0.5].all() and bare.mean() < 0.3 and marks is given
+    kept = finish(first.first_look(reference, scan, given, leave_out=("glasses", "beard")))
+    assert kept.left_out["hair"] == 0 and len(asked) == 1
 
 
 def test_likeliest_heights_go_on_as_they_begin_and_fade_out():
