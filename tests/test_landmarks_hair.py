@@ -13,10 +13,13 @@ from headshop.sim.adapt.closest import Surface
 from headshop.sim.adapt.ears import EAR_MARKS
 from headshop.sim.anatomy.landmark_names import SKIN
 from headshop.sim.landmarks import find
+from headshop.sim.landmarks import first_look as first
+from headshop.sim.landmarks import under_hair as under_hair_of
 from headshop.sim.landmarks.confidence import LIKE_AN_EAR, judge_together, like_ears
 from headshop.sim.landmarks.find import find_landmarks
 from headshop.sim.landmarks.first_look import first_look
 from headshop.sim.landmarks.fringe import fit_without_fringe, fringe_zone, has_fringe, left_beside
+from headshop.sim.landmarks.hair_rim import rim_of_hair
 from headshop.sim.landmarks.pose_search import Pose
 from headshop.sim.landmarks.shape_fit import CHANGE, REST, Expression, ShapeFit, fit_shape
 from headshop.sim.landmarks.shape_space import shape_space
@@ -135,14 +138,20 @@ def test_a_head_with_thick_hair_has_a_whole_crown(hairy, reference):
     assert truth["v"][2] - 8 < top < truth["v"][2] + THICK + 3
 
 
-def test_hair_over_ears_is_smoother_than_ears(reference):
-    """The landmarks of what lies as near as an ear, but has none of its folds, are not those of an ear."""
-    space = shape_space(reference)
+def without_folds(space):
+    """(n, 3) mm, the reference's skin with its ears smoothed over."""
     covered = space.points.copy()
     ears = np.flatnonzero(space.ear > 0.2)
     near = cKDTree(space.points).query(space.points[ears], 60)[1]
     for _ in range(20):
         covered[ears] = covered[near].mean(axis=1)
+    return covered
+
+
+def test_hair_over_ears_is_smoother_than_ears(reference):
+    """The landmarks of what lies as near as an ear, but has none of its folds, are not those of an ear."""
+    space = shape_space(reference)
+    covered = without_folds(space)
     none = np.zeros(len(space.points))
     fit = ShapeFit(space.points, none[:1], Pose(1.0, np.eye(3), none[:3], 0.0), none + 1, none, np.zeros((1, 1)))
     for points, seen in ((space.points, True), (covered, False)):
@@ -186,6 +195,21 @@ def test_little_of_the_step_where_hair_begins_is_taken_for_forehead(reference):
     kept = np.isin(np.arange(len(off)), cKDTree(scan.vertices).query(look.target.vertices)[1])
     front = (scan.vertices[:, 1] < truth["t_l"][1] - 10) & (scan.vertices[:, 2] > truth["g"][2])
     assert kept[front & (off > 6)].mean() < 0.08 and kept[front & (off < 0.1)].mean() > 0.98
+
+
+def test_scalp_under_hair_is_filled_in_where_it_is_told_to_be(reference, shaggy, monkeypatch):
+    scan, _, truth = shaggy
+    told = []
+
+    def raised(space, hair, covered, given):
+        told.append((covered, given))
+        return replace(hair.scalp, points=hair.scalp.points + [0.0, 0.0, 40.0])
+
+    monkeypatch.setattr(first, "scalp_by_face", raised)
+    given = of_face(truth)
+    look = finish(first_look(reference, surface_of(scan), given))
+    assert look.filled.vertices[:, 2].max() > truth["v"][2] + 20
+    assert told[0][0].any() and told[0][1] is given
 
 
 def test_a_picked_back_of_the_head_is_heeded_where_hair_is_seen_elsewhere(reference, shaggy):
@@ -284,8 +308,10 @@ def on_forehead(points, truth):
     return (z > truth["sci_l"][2] + 3) & (z < truth["tr"][2]) & (y < truth["g"][1] + 40)
 
 
-def test_a_fringe_is_left_out_and_the_forehead_below_it_invented(reference, fringed):
+def test_a_fringe_is_left_out_and_the_forehead_below_it_invented(reference, fringed, monkeypatch):
     scan, whole, truth = fringed
+    bare = []
+    monkeypatch.setattr(first, "rim_of_hair", lambda *told: bare.append(told[-2]) or rim_of_hair(*told))
     scan, below = surface_of(scan), Surface(whole, reference.skin.triangles)
     look = finish(first_look(reference, scan, of_face(truth)))
     assert look.left_out["hair"] == pytest.approx(scan.area.sum() - look.target.area.sum())
@@ -299,6 +325,8 @@ def test_a_fringe_is_left_out_and_the_forehead_below_it_invented(reference, frin
     hidden = reference.landmarks.on({"skin": drawn(reference.skin.faces, reference.skin.vertices)})["tr"]
     near = np.argsort(np.linalg.norm(reference.skin.vertices - hidden, axis=1))[:8]
     assert np.isin(near, look.hidden).all(), "what is shown there is told to be no skin of the scan"
+    space = shape_space(reference)
+    assert bare[0][cKDTree(space.points).query(space.landmarks(space.points)["tr"])[1]], "it has no rim besides"
 
 
 def test_landmarks_clicked_on_a_fringe_count_for_nothing(reference, fringed):
@@ -452,6 +480,29 @@ def test_ears_are_seen_where_they_are_expected(reference, laid):
     normals = vertex_normals(space.points, space.triangles)
     hair = Surface(space.points + np.where(left[:, None], 20.0 * normals, 0), space.triangles)
     assert ear_found(space, fit, hair, "l") < 0.7 and ear_found(space, fit, hair, "r") == 1
+
+
+def test_beside_an_ear_under_hair_the_other_must_be_found_better(reference, shaggy, laid, monkeypatch):
+    space = shape_space(reference)
+    scan, fit = surface_of(shaggy[0]), laid(space, shaggy[1][space.vertices])
+    for left, right, hidden in ((0.95, 0.89, ()), (0.5, 0.89, ("l", "r")), (0.5, 0.95, ("l",))):
+        monkeypatch.setattr(
+            under_hair_of, "ear_found", lambda *told, seen=(left, right): dict(zip("lr", seen, strict=True))[told[-1]]
+        )
+        assert finish(fit_under_hair(space, scan, fit, Expression())).hidden == hidden
+
+
+def test_ears_of_a_head_without_hair_that_are_like_none_are_not_seen(reference, laid):
+    """What was smoothed over, for one; but those that somebody picked are there."""
+    space = shape_space(reference)
+    fit, smooth = laid(space, space.points), without_folds(space)
+    for points, given, hidden in (
+        (space.points, (), ()),
+        (smooth, (), ("l", "r")),
+        (smooth, ("t_l",), ("r",)),
+    ):
+        hair = finish(fit_under_hair(space, Surface(points, space.triangles), fit, Expression(), given))
+        assert not hair.covered.any() and hair.hidden == hidden
 
 
 @pytest.fixture(scope="module")
