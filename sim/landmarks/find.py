@@ -20,6 +20,7 @@ from .fringe import fit_without_fringe, left_beside
 from .glasses import fit_without_glasses, glasses_seen
 from .infant import with_mouth_in_place
 from .looking import run
+from .mouth_beside_hair import with_mouth_again
 from .picked import picked
 from .placed_face import place_face, with_likelier_ears
 from .pose_search import LOOKING
@@ -116,7 +117,12 @@ def _finding(mesh: Mesh, reference: Head | None, unit_scales, any_size: bool) ->
         fit = yield from run(with_mouth_in_place(space, target, fit), 0.81, 0.82, "Looking for the mouth")
     misfit = misfit_of(space, fit)
     fit, shown = yield from run(fit_expression(space, target, fit, scan), 0.82, 0.88, "Looking at lips and lids")
-    hair = yield from run(fit_under_hair(space, haired, fit, shown, fringe=fringe), 0.88, 0.9, "Looking for hair")
+    hair = yield from run(fit_under_hair(space, haired, fit, shown, fringe=fringe), 0.88, 0.89, "Looking for hair")
+    again = yield from run(with_mouth_again(space, target, hair, shown), 0.89, 0.895, "Looking for the mouth")
+    if again is not None:
+        hair = yield from run(
+            fit_under_hair(space, haired, again, shown, fringe=fringe), 0.895, 0.9, "Looking for hair"
+        )
     fit = hair.fit
     positions = picked(space, fit, target)
     confidence, mid_air, missing = judge(space, fit, target, positions)
