@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The mouth of a face beside hair.
 
-Before it is known what is hair, curtains of it beside the cheeks pull at a face. Of seventeen people with hair made for them one
-got a mouth a centimetre too high, out of which no later fit found: the lips did not meet where the scan's do. Looked for anew, in
-the knowledge of what is hair, they do.
+Before it is known what is hair, curtains of it beside the cheeks pull at a face. Of seventeen people with hair made for
+them one got a mouth a centimetre too high, out of which no later fit found: the lips did not meet where the scan's do.
+Looked for anew, in the knowledge of what is hair, they do.
 """
 
 from ..adapt.closest import Surface
