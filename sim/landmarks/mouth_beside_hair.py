@@ -10,7 +10,7 @@ from ..adapt.closest import Surface
 from .expression import line_of
 from .shape_fit import SCHEDULE, Expression, fit_shape
 from .shape_space import ShapeSpace
-from .under_hair import EDGE, UnderHair, about_ears, in_face
+from .under_hair import UnderHair, beside_face
 
 
 def with_mouth_again(space: ShapeSpace, target: Surface, hair: UnderHair, shown: Expression):
@@ -18,6 +18,6 @@ def with_mouth_again(space: ShapeSpace, target: Surface, hair: UnderHair, shown:
     ``hair``, if that finds where closed lips meet and the one there is does not; else None."""
     if not hair.covered.any() or shown.parted or line_of(space, hair.fit, target) is not None:
         return None
-    unseen = hair.covered | (about_ears(space, hair.hidden) & ~in_face(space, hair.fit, {}, EDGE))
+    unseen = hair.covered | beside_face(space, hair.fit, hair.hidden)
     again = yield from fit_shape(space, target, hair.fit.pose, SCHEDULE, None, 1, shown, None, unseen)
     return again if line_of(space, again, target) is not None else None

@@ -119,11 +119,10 @@ def fit_under_hair(
     bare = np.flatnonzero(in_face(space, fit, {}, INNER) & ~fringe)
     held = Told(np.repeat(bare[:, None], 3, axis=1), np.full((len(bare), 3), 1 / 3), fit.points[bare])
     held = held.and_of(told_of_skull(space, fit, skull) if skull else None)
-    outside = ~in_face(space, fit, {}, EDGE)
 
     def without(sides):
         """The work of a fit that knows nothing of the ears of these ``sides``, and the points of skin about those."""
-        about = about_ears(space, sides) & outside
+        about = beside_face(space, fit, sides)
         hair = covered | about
         return fit_shape(space, target, fit.pose, CHANGE, fit.coefficients, 1, shown, held, hair), about
 
@@ -189,6 +188,11 @@ def about_ears(space: ShapeSpace, sides: Collection[str]) -> np.ndarray:
     for side in sides:
         about |= cKDTree(space.points[_ear(space, side)]).query(space.points)[0] < WITH_EARS
     return about
+
+
+def beside_face(space: ShapeSpace, fit: ShapeFit, sides: Collection[str]) -> np.ndarray:
+    """(n,) bool: the points of the skin about the ears of ``sides`` that hair hides with them: those outside of the face."""
+    return about_ears(space, sides) & ~in_face(space, fit, {}, EDGE)
 
 
 def ear_found(space: ShapeSpace, fit: ShapeFit, target: Surface, side: str) -> float:
