@@ -14,8 +14,10 @@ from headshop.sim.landmarks.pose_search import Pose
 from headshop.sim.landmarks.shape_fit import CHANGE, REST, Expression, ShapeFit, fit_shape
 from headshop.sim.landmarks.shape_space import shape_space
 from headshop.sim.landmarks.under_hair import (
+    EDGE,
     UnderHair,
     about_ears,
+    beside_face,
     ear_found,
     fit_under_hair,
     in_face,
@@ -115,6 +117,16 @@ def test_what_is_expected_of_ears_counts_where_they_are_not_seen(reference, miss
         for side in "lr":
             assert (off[side] > 0.3) == (side in missing), off
         assert missing or max(off.values()) == 0
+
+
+def test_what_hair_hides_with_an_ear_is_no_face(reference, laid):
+    space = shape_space(reference)
+    fit = laid(space, space.points)
+    hidden, face = beside_face(space, fit, "l"), in_face(space, fit, {}, EDGE)
+    assert (about_ears(space, "l") & face).any() and not (hidden & face).any()
+    assert (
+        hidden[(space.ear > 0.5) & (space.points[:, 0] > 0)].mean() > 0.6 and not hidden[space.points[:, 0] < -40].any()
+    )
 
 
 def test_ears_are_seen_where_they_are_expected(reference, laid):
