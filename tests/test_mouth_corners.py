@@ -11,7 +11,15 @@ from headshop.sim.adapt.closest import Surface
 from headshop.sim.landmarks import expression
 from headshop.sim.landmarks.expression import lips_ajar
 from headshop.sim.landmarks.find import find_landmarks
-from headshop.sim.landmarks.mouth_outline import DOWN, gap_end, lip_rolls, looked_at, mouth_outline, widest_gap
+from headshop.sim.landmarks.mouth_outline import (
+    DOWN,
+    gap_end,
+    lip_rolls,
+    looked_at,
+    mouth_outline,
+    widest_gap,
+    without_islands,
+)
 from headshop.sim.landmarks.pose_search import Pose
 from headshop.sim.progress import finish
 from headshop.sim.relax.mouth_gap import lip_edges
@@ -147,6 +155,15 @@ def test_lips_of_an_open_mouth_roll_in_and_edges_of_a_hole_do_not(upper, lower, 
     assert found.no_hole is (min(upper, lower) > 0)
 
 
+@pytest.mark.parametrize(("wide", "rolled", "seen"), [(5.0, 1.5, True), (5.0, 0.0, False), (3.4, 1.5, False)])
+def test_lips_a_few_millimetres_apart_are_parted_if_they_roll_in(wide, rolled, seen):
+    """A crack as wide as the mouth: of one that noise made between closed lips, the edges are too near to each other."""
+    found = mouth_outline(_face(wide=wide, rolled=(rolled, rolled)), _guess(), FORWARD)
+    assert (found is not None) == seen
+    if seen:
+        assert found.no_hole and np.linalg.norm(found.upper - found.lower) == pytest.approx(wide, abs=1.5)
+
+
 def _behind(face, lip):
     """``face`` with the edge of the ``upper`` or the ``lower`` lip, or of ``both``, going on straight back, out of sight."""
     rim = np.flatnonzero(face.gap_vertex | face.border_vertex)
@@ -267,6 +284,42 @@ def test_the_lower_lip_between_a_crease_and_a_hole_under_it_is_no_tooth():
     assert widest_gap(np.concatenate([upper, crease, lip, hole, chin])) is None
     first, last = widest_gap(np.concatenate([upper, crease, teeth, hole, chin]))
     assert (first, last) == (9, 46) and (last - first) * DOWN > 18
+
+
+@pytest.mark.parametrize("touching", [False, True])
+def test_teeth_hide_no_gap_where_the_lower_lip_is_far_back(touching):
+    """In a smile they lie before the way from the upper lip to the lower, and here and there the scan joins them to it."""
+    face = _face(wide=14.0)
+    below = face.vertices[:, 2] < RISE * (face.vertices[:, 0] / HALF) ** 2
+    low = np.array([0.0, 9, 0]) * below[:, None] * np.clip(1 - np.abs(face.vertices[:, :1]) / HALF, 0, 1) ** 0.5
+    across, up = np.meshgrid(np.linspace(-18, 6, 61), np.linspace(-9, 9, 46))  # but for those on the left
+    teeth = np.stack([across, across**2 / 40 + 5.5, up], axis=2).reshape(-1, 3)
+    share, more = across.ravel() / HALF, _triangles(across.shape)
+    from_edges = 7 * (1 - share**2) - np.abs(up.ravel() - RISE * share**2)
+    lower = up.ravel() < RISE * share**2
+    bridge = (from_edges > 1.5) | (touching & lower & (np.abs(across.ravel() + 6) < 0.7))
+    more = more[bridge[more].all(axis=1)] + len(face.vertices)
+    whole = Surface(np.concatenate([face.vertices + low, teeth]), np.concatenate([face.triangles, more]))
+    found = mouth_outline(whole, _guess(), FORWARD)
+    assert found.upper[2] == pytest.approx(7, abs=1.5) and found.lower[2] == pytest.approx(-7, abs=1.5)
+    for name, side in (("ch_l", 1), ("ch_r", -1)):
+        assert found.corners[name][[0, 2]] == pytest.approx([side * HALF, RISE], abs=4.0)
+
+
+def test_what_hardly_any_skin_joins_to_the_rest_is_an_island():
+    skin = np.zeros((60, 60))
+    assert without_islands(skin) is skin
+    skin[10:50, 20:40] = np.nan  # the mouth
+    teeth = skin.copy()
+    teeth[20:40, 24:36] = 4.0
+    np.testing.assert_array_equal(without_islands(teeth), skin)
+    teeth[30:32, 20:40] = 4.0  # two columns that reach either lip
+    kept = without_islands(teeth)
+    assert np.isnan(kept[20:40, 26:34]).all() and np.isfinite(kept[np.isfinite(skin)]).all()
+    teeth[20:40, 24:40] = 0.5  # as wide as they are: a lip
+    np.testing.assert_array_equal(np.isfinite(without_islands(teeth)), np.isfinite(teeth))
+    teeth[20:40, 24:40] = 4.0  # but it lies far back
+    assert np.isnan(without_islands(teeth)[20:40, 24:39]).all()
 
 
 def test_a_speck_beside_the_mouth_does_not_widen_it():

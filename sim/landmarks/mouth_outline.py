@@ -8,6 +8,9 @@ From the middle of the mouth that gap is followed to either side, until the lips
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import binary_erosion, distance_transform_edt
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 
 from ..adapt.closest import Surface
 from ..relax.mouth_gap import DEEP, SPECK, STEP, bridged_depths
@@ -20,6 +23,8 @@ MIDDLE = np.array([0.0, 2.0, -2.0, 4.0, -4.0])  # mm: columns in which the gap i
 BEHIND = 1.5  # mm: what lies deeper than this behind the line from lip to lip is within the mouth
 DRIFT = 1.5  # mm that an edge of the gap may rise or fall from one column to the next
 BESIDE = 2.0  # mm above and below the gap within which the lips are looked for
+#: mm between lips that are known to be apart, if they are around no hole: noise parts closed ones by 2.9.
+LEAST = 4.0
 NARROW = 25.0  # mm between corners below which it is no mouth
 NEAR = 6.0  # mm from where the gap ends to the scan
 FARTHEST = 2 * DEEP  # mm looked behind the upper lip: the lower one of a mouth open in full lies beyond 25
@@ -57,9 +62,11 @@ def mouth_outline(target: Surface, marks, forward, scale: float = 1.0) -> MouthO
     scale : mm on the scan per mm of the reference
     """
     places, depth = looked_at(target, marks, forward, scale)
+    depth = without_islands(depth)
     start = middle_gap(depth)
     if start is None and goes_on_below(depth):
         places, depth = looked_at(target, marks, forward, scale, LOWER)
+        depth = without_islands(depth)
         start = middle_gap(depth)
     if start is None:
         return None
@@ -74,6 +81,8 @@ def mouth_outline(target: Surface, marks, forward, scale: float = 1.0) -> MouthO
     if not found.found.all() or np.linalg.norm(np.subtract(*found.points)) < NARROW * scale:
         return None
     no_hole = min(lip_rolls(depth, column)) > ROLL or scan_goes_on(target, places, scale * depth, forward, column)
+    if not no_hole and (start[2] - start[1]) * DOWN <= APART:
+        return None
     return MouthOutline(dict(zip(CORNERS, found.points, strict=True)), upper, lower, bool(no_hole))
 
 
@@ -86,6 +95,27 @@ def looked_at(target: Surface, marks, forward, scale: float, lower: float = 0.0)
     places = arch[:, None] + above[:, None] * up
     depth = bridged_depths(target, places.reshape(-1, 3), forward, scale * FARTHEST).reshape(places.shape[:2])
     return places, depth / scale
+
+
+def without_islands(depth) -> np.ndarray:
+    """The ``depth`` (c, r) mm, see `looked_at`, without what hardly any skin joins to the edge of what was looked at: teeth,
+    which have edges all round, and lie before the way from lip to lip where the lower one is far back."""
+    there = np.isfinite(depth)
+    if there.all():
+        return depth
+    core = binary_erosion(there, np.ones((3, 3)), border_value=True)
+    number = np.arange(depth.size).reshape(depth.shape)
+    sides = []
+    for one, other in ((np.s_[:-1], np.s_[1:]), (np.s_[:, :-1], np.s_[:, 1:])):
+        joined = core[one] & core[other] & (np.abs(depth[one] - depth[other]) <= STEP)
+        sides.append(np.stack([number[one][joined], number[other][joined]]))
+    a, b = np.concatenate(sides, axis=1)
+    label = connected_components(coo_matrix((np.ones(len(a)), (a, b)), shape=(depth.size,) * 2))[1].reshape(depth.shape)
+    edge = np.zeros(depth.shape, dtype=bool)
+    edge[[0, -1]] = edge[:, [0, -1]] = True
+    skin = core & np.isin(label, label[edge & core])
+    near = distance_transform_edt(~core, return_distances=False, return_indices=True)
+    return np.where(there & skin[tuple(near)], depth, np.nan)
 
 
 def mouth_arch(marks, middle: str, forward, aside):
@@ -189,7 +219,7 @@ def widest_gap(line):
     for end in ends[::-1]:
         upper, lower = there[ends[0]], there[end + 1]
         before = way(line[upper], line[lower], lower - upper + 1) - line[upper : lower + 1] > BEHIND
-        if (lower - upper) * DOWN > APART and not before.any():
+        if (lower - upper) * DOWN > LEAST and not before.any():
             return upper, lower
     return None
 
