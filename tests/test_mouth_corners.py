@@ -18,11 +18,10 @@ from headshop.sim.landmarks.mouth_outline import (
     looked_at,
     mouth_outline,
     widest_gap,
-    without_islands,
 )
 from headshop.sim.landmarks.pose_search import Pose
 from headshop.sim.progress import finish
-from headshop.sim.relax.mouth_gap import lip_edges
+from headshop.sim.relax.mouth_gap import lip_edges, without_islands
 from headshop.sim.scan.clean import clean_scan
 from headshop.sim.scan.ply import read_ply
 

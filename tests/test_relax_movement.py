@@ -7,11 +7,22 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
+from headshop.assets.generators.make_expression_responses import share_of
 from headshop.sim.acting.expressions import expressions
 from headshop.sim.adapt.rest import rest_of
 from headshop.sim.mesh_subdivision import drawn
 from headshop.sim.relax import relaxed as relaxing
-from headshop.sim.relax.movement import HALF, RAISED, UNITS, measured, of_left, read_movement, with_measured
+from headshop.sim.relax.movement import (
+    BY_LIPS,
+    BY_MUSCLE,
+    HALF,
+    RAISED,
+    UNITS,
+    measured,
+    of_left,
+    read_movement,
+    with_measured,
+)
 from headshop.sim.relax.responses import responses
 from headshop.sim.scan.individual import draw_field
 
@@ -115,3 +126,32 @@ def test_the_table_comes_out_of_its_generator(shared):
     np.testing.assert_allclose(points, at, atol=0.06)
     for k, unit in enumerate(UNITS):
         np.testing.assert_allclose(moves[:, k], table[unit], atol=0.02, err_msg=unit)
+
+
+def test_muscles_move_skin_as_their_units_were_seen_to(reference):
+    table = responses()
+    vertices = reference.skin.vertices
+    known = measured(reference, vertices + table.jaw_at(0.5))
+    seen = ~rest_of(reference).inner & (vertices[:, 0] > 15)
+    for name, unit in BY_MUSCLE.items():
+        field, seen_to = table.fields[table.names.index(f"{name}_l")][seen].ravel(), known[unit][seen].ravel()
+        assert field @ seen_to > 0.83 * np.linalg.norm(field) * np.linalg.norm(seen_to), (
+            name
+        )  # the simulation's: .61 to .88
+    for unit, (upper, lower) in BY_LIPS.items():
+        sides = [[k for k, name in enumerate(table.names) if name.startswith(lip)] for lip in (upper, lower)]
+        fields = [table.fields[of].sum(axis=0) for of in sides]
+        lips = [{mark: np.linalg.norm(at_mark(reference, field, mark)) for mark in ("ls", "li")} for field in fields]
+        assert lips[0]["ls"] > 1.5 * lips[0]["li"] and lips[1]["li"] > 1.5 * lips[1]["ls"], unit
+        both = sum(fields)
+        assert at_mark(reference, both, "ls")[1] < -1 and at_mark(reference, both, "ch_l")[0] < -1, (
+            unit
+        )  # forward, inward
+
+
+def test_two_muscles_share_what_was_seen_as_far_as_each_reaches():
+    fields = np.zeros((2, 3, 3))
+    fields[0, 0] = fields[1, 1] = fields[:, 2] = [3.0, 4.0, 0.0]
+    share = share_of(*fields)
+    assert share[0] > 0.99 and share[1] < 0.01 and share[2] == pytest.approx(0.5)
+    np.testing.assert_allclose(share + share_of(*fields[::-1]), 1)

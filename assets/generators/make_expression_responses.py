@@ -16,7 +16,7 @@ from ...sim.acting.pose import Pose, control
 from ...sim.adapt.skin_fit import landmark_rows
 from ...sim.anatomy.storage import REFERENCE, load_head, write_atomically
 from ...sim.relax.bunching import fleshed
-from ...sim.relax.movement import RAISED, measured, of_left, with_measured
+from ...sim.relax.movement import BY_LIPS, BY_MUSCLE, RAISED, measured, of_left, with_measured
 from ...sim.relax.responses import MUSCLES, OPENINGS, TABLE, UNPAIRED, both_sides, mirrored_vertices
 from ...sim.tissue.model import build_model
 from ...sim.tissue.solver import rest_state, solve
@@ -51,6 +51,15 @@ def main(argv: list[str]) -> int:
     )
     raised = of_left(head, known["AU6"]) * below_eyes(head)[:, None] * RAISED / joy[f"{BROW}_l"]
     muscles[MUSCLES.index(BROW)] = with_measured(head, muscles[MUSCLES.index(BROW)], raised)
+    for name, unit in BY_MUSCLE.items():
+        k = MUSCLES.index(name)
+        muscles[k] = with_measured(head, muscles[k], of_left(head, known[unit]))
+    for unit, names in BY_LIPS.items():
+        upper, lower = (MUSCLES.index(name) for name in names)
+        way = known[unit] if names[0] in UNPAIRED else of_left(head, known[unit])
+        share = share_of(muscles[upper], muscles[lower])[:, None]
+        muscles[upper] = with_measured(head, muscles[upper], share * way)
+        muscles[lower] = with_measured(head, muscles[lower], (1 - share) * way)
     chin = landmark_rows(head.landmarks, ["gn"], len(rest))
     as_far = [np.linalg.norm(chin @ field) / np.linalg.norm(chin @ known["AU27"]) for field in jaw]
     jaw = [with_measured(head, field, share * known["AU27"]) for field, share in zip(jaw, as_far, strict=True)]
@@ -64,6 +73,12 @@ def main(argv: list[str]) -> int:
     )
     write_atomically(argv[0] if argv else TABLE, stream.getvalue())
     return 0
+
+
+def share_of(one, other) -> np.ndarray:
+    """(n,) share that ``one`` of two muscles has in what both do, of how far either moves the skin (n, 3) mm."""
+    first, second = (np.linalg.norm(field, axis=1) + STILL for field in (one, other))
+    return first / (first + second)
 
 
 def below_eyes(head) -> np.ndarray:

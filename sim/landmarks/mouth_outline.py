@@ -8,12 +8,9 @@ From the middle of the mouth that gap is followed to either side, until the lips
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import binary_erosion, distance_transform_edt
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from ..adapt.closest import Surface
-from ..relax.mouth_gap import DEEP, SPECK, STEP, bridged_depths
+from ..relax.mouth_gap import DEEP, SPECK, STEP, bridged_depths, without_islands
 from ..relax.parted import APART
 from ..relax.smile import CORNERS
 
@@ -95,27 +92,6 @@ def looked_at(target: Surface, marks, forward, scale: float, lower: float = 0.0)
     places = arch[:, None] + above[:, None] * up
     depth = bridged_depths(target, places.reshape(-1, 3), forward, scale * FARTHEST).reshape(places.shape[:2])
     return places, depth / scale
-
-
-def without_islands(depth) -> np.ndarray:
-    """The ``depth`` (c, r) mm, see `looked_at`, without what hardly any skin joins to the edge of what was looked at: teeth,
-    which have edges all round, and lie before the way from lip to lip where the lower one is far back."""
-    there = np.isfinite(depth)
-    if there.all():
-        return depth
-    core = binary_erosion(there, np.ones((3, 3)), border_value=True)
-    number = np.arange(depth.size).reshape(depth.shape)
-    sides = []
-    for one, other in ((np.s_[:-1], np.s_[1:]), (np.s_[:, :-1], np.s_[:, 1:])):
-        joined = core[one] & core[other] & (np.abs(depth[one] - depth[other]) <= STEP)
-        sides.append(np.stack([number[one][joined], number[other][joined]]))
-    a, b = np.concatenate(sides, axis=1)
-    label = connected_components(coo_matrix((np.ones(len(a)), (a, b)), shape=(depth.size,) * 2))[1].reshape(depth.shape)
-    edge = np.zeros(depth.shape, dtype=bool)
-    edge[[0, -1]] = edge[:, [0, -1]] = True
-    skin = core & np.isin(label, label[edge & core])
-    near = distance_transform_edt(~core, return_distances=False, return_indices=True)
-    return np.where(there & skin[tuple(near)], depth, np.nan)
 
 
 def mouth_arch(marks, middle: str, forward, aside):

@@ -35,12 +35,14 @@ ROUNDS = 3
 @dataclass(frozen=True, eq=False)
 class Expression:
     """jaw : opening, 0..1; muscles : name -> contraction; displacement (n, 3) mm of the reference's skin by both, and
-    by what they leave unexplained; modelled (n, 3) mm : by both alone."""
+    by what they leave unexplained; modelled (n, 3) mm : by both alone; cost : how far the face, what is told and what
+    expressions usually do are from it, the sum of squares in deviations."""
 
     jaw: float
     muscles: dict[str, float]
     displacement: np.ndarray
     modelled: np.ndarray
+    cost: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +105,8 @@ def explain(
     left = y - by_jaw * opening - sampled @ contraction
     beyond = (others.covariance(None, rows) @ cho_solve(factor, left)).reshape(-1, 3)
     muscles = {table.names[k]: float(a) for k, a in zip(pick, contraction[:-1], strict=True)}
-    return Expression(opening, muscles, modelled + beyond, modelled)
+    cost = np.sum(solve_triangular(factor[0], left, lower=True) ** 2) + np.sum((shrink @ found) ** 2)
+    return Expression(opening, muscles, modelled + beyond, modelled, float(cost))
 
 
 def shrinkage(names, smiles: bool = False) -> np.ndarray:

@@ -6,6 +6,9 @@ most a crack of missing data.
 """
 
 import numpy as np
+from scipy.ndimage import binary_erosion, distance_transform_edt
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from ..adapt.closest import Surface
@@ -42,6 +45,7 @@ def lip_edges(target: Surface, given, forward, shares, arched: bool = False):
     if any(name not in given for name in MARKS):
         return out
     lines, depth = profiles(target, given, forward, shares, arched)
+    depth = without_islands(depth, lips_only=True)
     for k, (line, behind) in enumerate(zip(lines, depth, strict=True)):
         length = np.linalg.norm(line[-1] - line[0])
         found = first_and_last_edge(behind, int(SPECK / length * STEPS))
@@ -64,6 +68,32 @@ def profiles(target: Surface, given, forward, shares, arched: bool = False):
     upper, lower = (middle + aside * (corner - middle) + over * (given[name] - middle) for name in ("ls", "li"))
     lines = upper[:, None] + np.linspace(0, 1, STEPS)[:, None] * (lower - upper)[:, None]
     return lines, bridged_depths(target, lines.reshape(-1, 3), forward).reshape(len(shares), STEPS)
+
+
+def without_islands(depth, lips_only: bool = False) -> np.ndarray:
+    """Depths (c, r) mm, NaN where there is nothing, without what hardly any skin joins to the edge of what was looked at:
+    teeth, which have edges all round. They may lie before the way from lip to lip, and touch a lip.
+
+    lips_only : skin joins only to where the columns begin and end, as they are cut off beside the middle of the mouth
+    """
+    there = np.isfinite(depth)
+    if there.all():
+        return depth
+    core = binary_erosion(there, np.ones((3, 3)), border_value=True)
+    number = np.arange(depth.size).reshape(depth.shape)
+    sides = []
+    for one, other in ((np.s_[:-1], np.s_[1:]), (np.s_[:, :-1], np.s_[:, 1:])):
+        joined = core[one] & core[other] & (np.abs(depth[one] - depth[other]) <= STEP)
+        sides.append(np.stack([number[one][joined], number[other][joined]]))
+    a, b = np.concatenate(sides, axis=1)
+    label = connected_components(coo_matrix((np.ones(len(a)), (a, b)), shape=(depth.size,) * 2))[1].reshape(depth.shape)
+    edge = np.zeros(depth.shape, dtype=bool)
+    edge[:, [0, -1]] = True
+    if not lips_only:
+        edge[[0, -1]] = True
+    skin = core & np.isin(label, label[edge & core])
+    near = distance_transform_edt(~core, return_distances=False, return_indices=True)
+    return np.where(there & skin[tuple(near)], depth, np.nan)
 
 
 def smoothed(edges, shares, at) -> np.ndarray:

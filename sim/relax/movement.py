@@ -3,7 +3,8 @@
 
 Our tissue's smile lifts the medial cheek by 13 mm, where people's lift it by 6.7 +- 2.4 (Freytag et al. 2022, Aesthet. Surg. J.
 42:1-9), and draws the corners of the mouth too little aside and back. Where such movement is known, it counts as much as the
-simulation does (`HALF`): of cheeks that are raised, corners that are pulled and a jaw that opens.
+simulation does (`HALF`): of cheeks that are raised, corners that are pulled, lips that are raised, lowered, stretched, pursed
+or funnelled, a nose that wrinkles and a jaw that opens.
 
 The table ``assets/tables/skin_movement.csv``, by ``assets/generators/skin_movement.py``, names its source.
 """
@@ -22,7 +23,22 @@ from ..anatomy.head import Head
 TABLE = Path(__file__).resolve().parents[2] / "assets" / "tables" / "skin_movement.csv"
 
 #: Action units of the table, each of both sides at its full (Ekman, Friesen and Hager 2002).
-UNITS = ("AU6", "AU12", "AU27")
+UNITS = ("AU6", "AU9", "AU11", "AU12", "AU15", "AU16", "AU17", "AU18", "AU20", "AU22", "AU27")
+#: What each unit's muscle is (the same): Ekman's AU11 is what ICT-FaceKit raises the upper lip by. AU6, AU12 and AU27 are more
+#: than a muscle: see the generator of the responses.
+BY_MUSCLE = {
+    "levator_labii_alaeque_nasi": "AU9",
+    "levator_labii_superioris": "AU11",
+    "depressor_anguli_oris": "AU15",
+    "depressor_labii_inferioris": "AU16",
+    "mentalis": "AU17",
+    "risorius": "AU20",
+}
+#: Of these, the muscles of the upper and of the lower lip.
+BY_LIPS = {
+    "AU18": ("incisivus_labii_superioris", "incisivus_labii_inferioris"),
+    "AU22": ("orbicularis_oris_upper", "orbicularis_oris_lower"),
+}
 HALF = 0.5
 #: The raising of the cheeks that goes with a full pull at the corners: 0.6 to 0.8 in happiness, 6 + 12 of EMFACS (an estimate).
 RAISED = 0.75

@@ -32,6 +32,8 @@ MUSCLES = (
     "platysma",
     "orbicularis_oris_upper",
     "orbicularis_oris_lower",
+    "incisivus_labii_superioris",
+    "incisivus_labii_inferioris",
     "orbicularis_oculi_orbital",
     "orbicularis_oculi_palpebral",
 )

@@ -23,14 +23,14 @@ WIDER, RISE, SHORTER = 0.27, np.radians(47), 0.28
 #: mm: corners go 7 to 22 mm (Paletz, Manktelow and Chaban 1994, The shape of a normal smile), which is a deviation of 3.3 mm,
 #: or of 1.9 mm along each axis; a little of it is known from how strong the smile seems.
 DEVIATION = 1.8
-#: How much of a smile that seems weaker or stronger than others is believed: a face as such may look like that.
+#: How much of a smile that seems weaker or stronger than others is believed: a face as such may look like that. It hardly looks
+#: otherwise on one side than on the other, and what the sides do differently is believed.
 HEEDED = 0.66
 UNTOLD = 1e3  # mm: nothing is known along that axis
 NOSE = ("al_l", "al_r", "sn")
 BROADER = 0.14
 #: mm by which a wing's way aside, and the base's, differ from person to person (our own estimates).
 WINGS, BASE = 1.0, 1.5
-SMILE = 0.24  # share of a smile's lift of the corners from which on an expression is one
 
 
 def told_of_smile(reference: Head, table: Responses, drawn_rows, lip: int, opening: float, lifts=(1.0, 1.0)) -> Told:
@@ -40,8 +40,8 @@ def told_of_smile(reference: Head, table: Responses, drawn_rows, lip: int, openi
     lip : the vertex in the middle of the upper lip, where it meets the lower one
     opening : the jaw's, 0..1; lifts : how far it seems to lift the left and the right corner (`lifted`), of what smiles do
     """
-    sides = 1 + HEEDED * (np.asarray(lifts) - 1)
-    strength = sides.mean()
+    strength = 1 + HEEDED * (np.mean(lifts) - 1)
+    sides = strength + np.asarray(lifts) - np.mean(lifts)
     n = drawn_rows.shape[0]
     marks = reference.landmark_positions()
     out = WIDER * np.linalg.norm(marks["ch_l"] - marks["ch_r"]) / 2
