@@ -315,13 +315,28 @@ def test_missing_triangles_are_no_gap_between_lips(inside):
     np.testing.assert_allclose(found[between], 12.0 if inside else np.nan, atol=0.1)
 
 
-def test_the_mouths_inside_is_no_lip():
-    def sheet(x, y, z):
-        return [[x[0], y, z[0]], [x[1], y, z[0]], [x[1], y, z[1]], [x[0], y, z[1]]]
+def _sheets(*sides):
+    """A `Surface` of upright sheets, each from x to x, at y, from z to z."""
+    corners = [[[x, y, z] for x, z in zip((a, b, b, a), (c, c, d, d), strict=True)] for (a, b), y, (c, d) in sides]
+    triangles = [[[4 * k, 4 * k + 1, 4 * k + 2], [4 * k, 4 * k + 2, 4 * k + 3]] for k in range(len(sides))]
+    return Surface(np.array(np.concatenate(corners), dtype=float), np.concatenate(triangles))
 
-    sheets = [sheet((-10, 10), 0, (1, -5)), sheet((-30, 30), 20, (-2, -14)), sheet((-30, 30), 0, (-15, -25))]
-    triangles = np.concatenate([[[4 * k, 4 * k + 1, 4 * k + 2], [4 * k, 4 * k + 2, 4 * k + 3]] for k in range(3)])
-    target = Surface(np.array(np.concatenate(sheets), dtype=float), triangles)
+
+@pytest.mark.parametrize("teeth", [False, True])
+def test_teeth_that_touch_the_lower_lip_are_no_part_of_it(teeth):
+    """Of a smile: nothing but a slit is between them, and here and there not even that; the lips are far apart."""
+    lips = [((-40, 40), 0, (20, 4)), ((-40, 40), 4, (-5, -20))]
+    crowns = [((9 * k - 4, 9 * k + 4), 4.8, (1, -4.6)) for k in range(-2, 3)]
+    target = _sheets(*lips, *crowns, ((5.5, 6.5), 4.6, (-4, -6))) if teeth else _sheets(*lips)
+    given = {"ls": [0, 0, 9], "li": [0, 4, -10], "ch_l": [30, 2, 0], "ch_r": [-30, 2, 0]}
+    given = {name: np.array(place, dtype=float) for name, place in given.items()}
+    edges = lip_edges(target, given, np.array([0, -1.0, 0]), np.linspace(-0.25, 0.25, 11))
+    np.testing.assert_allclose(edges[:, :, 2], np.tile([4.0, -5.0], (11, 1)), atol=1.3)
+
+
+def test_the_mouths_inside_is_no_lip():
+    sheets = [((-10, 10), 0, (1, -5)), ((-30, 30), 20, (-2, -14)), ((-30, 30), 0, (-15, -25))]
+    target = _sheets(*sheets)
     given = {"ls": [0, 0, 0], "li": [0, 0, -20], "ch_l": [40, 0, -10], "ch_r": [-40, 0, -10]}
     given = {name: np.array(place, dtype=float) for name, place in given.items()}
     edges = lip_edges(target, given, np.array([0, -1.0, 0]), np.array([0.0, 0.1, 0.4]))
