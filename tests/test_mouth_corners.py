@@ -14,6 +14,7 @@ from headshop.sim.landmarks.find import find_landmarks
 from headshop.sim.landmarks.mouth_outline import (
     DOWN,
     gap_end,
+    gaps_about,
     lip_rolls,
     looked_at,
     mouth_outline,
@@ -205,9 +206,10 @@ def test_a_lower_lip_is_found_as_far_back_as_a_jaw_takes_it(back):
 
 def test_how_far_lips_roll_in_is_measured_at_either():
     column = looked_at(_face(rolled=(3.0, 1.5)), _guess(), FORWARD, 1.0)[1]
-    upper, lower = lip_rolls(column, len(column) // 2)
+    upper, lower = lip_rolls(column, gaps_about(column, len(column) // 2))
     assert upper == pytest.approx(2.5, abs=0.6) and lower == pytest.approx(1.25, abs=0.4)  # 3 and 1.5 at the very edge
-    assert lip_rolls(looked_at(_face(gap=False), _guess(), FORWARD, 1.0)[1], len(column) // 2) == (0.0, 0.0)
+    closed = looked_at(_face(gap=False), _guess(), FORWARD, 1.0)[1]
+    assert lip_rolls(closed, gaps_about(closed, len(closed) // 2)) == (0.0, 0.0)
 
 
 @pytest.mark.parametrize("neck", [False, True])
@@ -319,6 +321,39 @@ def test_what_hardly_any_skin_joins_to_the_rest_is_an_island():
     np.testing.assert_array_equal(np.isfinite(without_islands(teeth)), np.isfinite(teeth))
     teeth[20:40, 24:40] = 4.0  # but it lies far back
     assert np.isnan(without_islands(teeth)[20:40, 24:39]).all()
+
+
+def test_what_hangs_before_the_skin_is_no_island_and_no_end_of_the_gap():
+    depth = np.zeros((60, 60))
+    depth[10:50, 25:40] = np.nan  # the mouth
+    flaked = depth.copy()
+    flaked[18:21, 15:24] = -4.0
+    np.testing.assert_array_equal(without_islands(flaked), flaked)
+    assert gap_end(without_islands(flaked), 30, 24, 40, -1)[0] == 10
+    flaked[18:21, 15:24] = 4.0  # behind it: seen through a hole
+    assert np.isnan(without_islands(flaked)[18:21, 15:24]).all()
+    depth[20:40, 29:36] = -4.0  # in the mouth it hangs before nothing
+    assert np.isnan(without_islands(depth)[20:40, 29:36]).all()
+
+
+@pytest.mark.parametrize(
+    ("low", "half", "rolled", "seen"),
+    [(0, 25, 1.5, True), (14, 25, 1.5, True), (14, 25, 0, False), (14, 13, 1.5, False)],
+)
+def test_a_mouth_is_found_above_where_it_was_expected_if_it_is_one(low, half, rolled, seen):
+    """The furrow under the lower lip lacks data too. A gap elsewhere is a mouth's if it is wide and lips roll in around it."""
+    face = _face(gap=False, wide=10.0, rolled=(rolled, rolled))
+    x, _, z = face.vertices.T
+    lip = np.exp(-(((z + 9.5) / 3.5) ** 2) - (x / 20) ** 2)[:, None]
+    full = face.vertices - [0, 3, 0] * lip
+    x, _, z = full[face.triangles].mean(axis=1).T
+    furrow = (x / 9) ** 2 + ((z + 17) / 3) ** 2 < 1
+    mouth = (np.abs(z - RISE * (x / HALF) ** 2) < 5 * (1 - (x / HALF) ** 2)) & (np.abs(x) < half)
+    guess = {name: place - [0, 0, low] for name, place in _guess().items()}
+    found = mouth_outline(Surface(full, face.triangles[~furrow & ~mouth]), guess, FORWARD)
+    assert (found is not None) == seen
+    if seen:
+        assert found.upper[2] == pytest.approx(5, abs=1.5) and found.lower[2] == pytest.approx(-5, abs=1.5)
 
 
 def test_a_speck_beside_the_mouth_does_not_widen_it():

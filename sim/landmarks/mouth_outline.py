@@ -16,6 +16,7 @@ from ..relax.smile import CORNERS
 
 ASIDE, DOWN = 1.0, 0.5  # mm from column to column, and from place to place in one
 WIDE, ABOVE = 46.0, 12.0  # mm to either side of the middle, and above the upper lip, that are looked at
+TOP = int(ABOVE / DOWN)  # places above the upper lip
 MIDDLE = np.array([0.0, 2.0, -2.0, 4.0, -4.0])  # mm: columns in which the gap is looked for first
 BEHIND = 1.5  # mm: what lies deeper than this behind the line from lip to lip is within the mouth
 DRIFT = 1.5  # mm that an edge of the gap may rise or fall from one column to the next
@@ -23,6 +24,7 @@ BESIDE = 2.0  # mm above and below the gap within which the lips are looked for
 #: mm between lips that are known to be apart, if they are around no hole: noise parts closed ones by 2.9.
 LEAST = 4.0
 NARROW = 25.0  # mm between corners below which it is no mouth
+NOT_WIDE = 32.0  # the same of one that is not where it was expected: nostrils and the furrow under a lip lack data too
 NEAR = 6.0  # mm from where the gap ends to the scan
 FARTHEST = 2 * DEEP  # mm looked behind the upper lip: the lower one of a mouth open in full lies beyond 25
 LOWER = 30.0  # mm: how much farther down is looked where a gap goes on below the chin that was expected
@@ -62,9 +64,16 @@ def mouth_outline(target: Surface, marks, forward, scale: float = 1.0) -> MouthO
     depth = without_islands(depth)
     start = middle_gap(depth)
     if start is None and goes_on_below(depth):
-        places, depth = looked_at(target, marks, forward, scale, LOWER)
-        depth = without_islands(depth)
-        start = middle_gap(depth)
+        lower, deeper = looked_at(target, marks, forward, scale, LOWER)
+        deeper = without_islands(deeper)
+        outline = _outline(target, lower, deeper, middle_gap(deeper), forward, scale)
+    else:
+        outline = _outline(target, places, depth, start, forward, scale)
+    return outline or _outline(target, places, depth, large_gap(depth), forward, scale, expected=False)
+
+
+def _outline(target, places, depth, start, forward, scale, expected=True) -> MouthOutline | None:
+    """The `MouthOutline` around a gap, ``start`` as of `middle_gap`, where one was ``expected``; None: it is no mouth."""
     if start is None:
         return None
     column, *lips = start
@@ -75,10 +84,12 @@ def mouth_outline(target: Surface, marks, forward, scale: float = 1.0) -> MouthO
         behind = depth[end, lips][np.isfinite(depth[end, lips])]
         corners.append(places[end, lips].mean(axis=0) - scale * (behind.mean() if len(behind) else 0.0) * forward)
     found = target.closest(np.array(corners), NEAR * scale)
-    if not found.found.all() or np.linalg.norm(np.subtract(*found.points)) < NARROW * scale:
+    narrow = NARROW if expected else NOT_WIDE
+    if not found.found.all() or np.linalg.norm(np.subtract(*found.points)) < narrow * scale:
         return None
-    no_hole = min(lip_rolls(depth, column)) > ROLL or scan_goes_on(target, places, scale * depth, forward, column)
-    if not no_hole and (start[2] - start[1]) * DOWN <= APART:
+    gaps = gaps_about(depth, column, TOP if expected else max(start[1] - TOP // 2, 0))
+    no_hole = min(lip_rolls(depth, gaps)) > ROLL or scan_goes_on(target, places, scale * depth, forward, gaps)
+    if not no_hole and not (expected and (start[2] - start[1]) * DOWN > APART):
         return None
     return MouthOutline(dict(zip(CORNERS, found.points, strict=True)), upper, lower, bool(no_hole))
 
@@ -115,38 +126,50 @@ def middle_gap(depth):
 
     depth (c, r) mm, see `looked_at`
     """
-    top, found = int(ABOVE / DOWN), []
+    found = []
     for column in len(depth) // 2 + (MIDDLE / ASIDE).astype(int):
-        lips = widest_gap(depth[column, top:])
+        lips = widest_gap(depth[column, TOP:])
         if lips is not None:
-            found.append((column, top + lips[0], top + lips[1]))
+            found.append((column, TOP + lips[0], TOP + lips[1]))
     if len(found) <= len(MIDDLE) / 2:
         return None
     lower = [start[2] for start in found]
     return found[int(np.argmin(np.abs(lower - np.percentile(lower, 50, method="lower"))))]
 
 
-def lip_rolls(depth, column: int) -> tuple[float, float]:
-    """mm by which the edges of the upper and the lower lip lie behind where those are foremost, about a ``column``: medians.
+def large_gap(depth):
+    """As `middle_gap`, of the largest gap anywhere above the chin: lips raised as far as in disgust may lead the search
+    for the face a centimetre too far down."""
+    found = []
+    for column in len(depth) // 2 + (MIDDLE / ASIDE).astype(int):
+        there = np.flatnonzero(np.isfinite(depth[column]))
+        k = np.argmax(np.diff(there)) if len(there) > 1 else 0
+        if len(there) > 1 and (there[k + 1] - there[k]) * DOWN > APART:
+            found.append((column, there[k], there[k + 1]))
+    return sorted(found, key=lambda gap: gap[1])[len(found) // 2] if len(found) > len(MIDDLE) / 2 else None
 
-    depth (c, r) mm, see `looked_at`
+
+def lip_rolls(depth, gaps) -> tuple[float, float]:
+    """mm by which the edges of the upper and the lower lip lie behind where those are foremost, beside ``gaps``: medians.
+
+    depth (c, r) mm, see `looked_at`; gaps : `gaps_about` the middle
     """
     rolls = [
         (_roll(depth[c, : upper + 1], depth[c, upper:]), _roll(depth[c, : lower - 1 : -1], depth[c, lower::-1]))
-        for c, upper, lower in gaps_about(depth, column)
+        for c, upper, lower in gaps
     ]
     upper, lower = np.median(rolls, axis=0) if rolls else (0.0, 0.0)
     return float(upper), float(lower)
 
 
-def scan_goes_on(target: Surface, places, depth, forward, column: int) -> bool:
-    """Whether the scan does not end at the edges of either lip about a ``column``, but turns out of sight there.
+def scan_goes_on(target: Surface, places, depth, forward, gaps) -> bool:
+    """Whether the scan does not end at the edges of either lip beside ``gaps``, but turns out of sight there.
 
-    places (c, r, 3) mm and depth (c, r) mm on the scan, see `looked_at`
+    places (c, r, 3) mm and depth (c, r) mm on the scan, see `looked_at`; gaps : `gaps_about` the middle
     """
-    gaps = np.array(gaps_about(depth, column))
     if len(gaps) == 0:
         return False
+    gaps = np.array(gaps)
     for lip in (1, 2):
         at = gaps[:, 0], gaps[:, lip]
         if target.closest(places[at] - depth[at][:, None] * forward, ENDS).border.mean() > ENDED:
@@ -154,12 +177,13 @@ def scan_goes_on(target: Surface, places, depth, forward, column: int) -> bool:
     return True
 
 
-def gaps_about(depth, column: int) -> list[tuple[int, int, int]]:
-    """Columns near to a ``column`` in which there is a gap, with the last place of the upper lip and the first of the lower.
+def gaps_about(depth, column: int, top: int = TOP) -> list[tuple[int, int, int]]:
+    """Columns near to a ``column`` in which there is a gap below the row ``top``, with the last place of the upper lip and the
+    first of the lower.
 
     depth (c, r) mm, see `looked_at`
     """
-    top, aside = int(ABOVE / DOWN), int(ROLLED_OVER / ASIDE)
+    aside = int(ROLLED_OVER / ASIDE)
     found = []
     for c in range(max(column - aside, 0), min(column + aside + 1, len(depth))):
         lips = widest_gap(depth[c, top:])

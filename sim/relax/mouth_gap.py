@@ -6,7 +6,7 @@ most a crack of missing data.
 """
 
 import numpy as np
-from scipy.ndimage import binary_erosion, distance_transform_edt
+from scipy.ndimage import binary_erosion, distance_transform_edt, label
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
@@ -27,6 +27,7 @@ FEWEST = 10  # edges that make a lip
 #: Sides of the scan's triangles: how far beside a gap it is asked how deep it lies, and how near the scan must be; of how many
 #: places.
 BRIDGED, ABOUT = 1.0, 6
+FLAKE = 0.7  # share of an island's outline where there is skin behind it from which on it hangs before that
 MIDDLE = 0.3  # shares of the way to the corner up to here tell how wide the mouth is open
 
 
@@ -86,14 +87,28 @@ def without_islands(depth, lips_only: bool = False) -> np.ndarray:
         joined = core[one] & core[other] & (np.abs(depth[one] - depth[other]) <= STEP)
         sides.append(np.stack([number[one][joined], number[other][joined]]))
     a, b = np.concatenate(sides, axis=1)
-    label = connected_components(coo_matrix((np.ones(len(a)), (a, b)), shape=(depth.size,) * 2))[1].reshape(depth.shape)
+    part = connected_components(coo_matrix((np.ones(len(a)), (a, b)), shape=(depth.size,) * 2))[1].reshape(depth.shape)
     edge = np.zeros(depth.shape, dtype=bool)
     edge[:, [0, -1]] = True
     if not lips_only:
         edge[[0, -1]] = True
-    skin = core & np.isin(label, label[edge & core])
+    skin = core & np.isin(part, part[edge & core])
     near = distance_transform_edt(~core, return_distances=False, return_indices=True)
-    return np.where(there & skin[tuple(near)], depth, np.nan)
+    joined = there & skin[tuple(near)]
+    return np.where(joined | in_front(depth, joined), depth, np.nan)
+
+
+def in_front(depth, skin) -> np.ndarray:
+    """(c, r) bool, islands that hang before the ``skin`` (c, r) bool of a map of depths (c, r) mm: strays and flakes."""
+    islands, count = label(np.isfinite(depth) & ~skin)
+    sides, before = np.zeros((2, count + 1))
+    for axis in (0, 1):
+        for way in (1, -1):
+            over, beside, deep = (np.roll(x, way, axis) for x in (islands, skin, depth))
+            rim = (islands > 0) & (over != islands)
+            sides += np.bincount(islands[rim], minlength=count + 1)
+            before += np.bincount(islands[rim & beside & (deep > depth)], minlength=count + 1)
+    return (islands > 0) & (before > FLAKE * sides)[islands]
 
 
 def smoothed(edges, shares, at) -> np.ndarray:
