@@ -334,6 +334,10 @@ def test_what_hangs_before_the_skin_is_no_island_and_no_end_of_the_gap():
     assert np.isnan(without_islands(flaked)[18:21, 15:24]).all()
     depth[20:40, 29:36] = -4.0  # in the mouth it hangs before nothing
     assert np.isnan(without_islands(depth)[20:40, 29:36]).all()
+    depth[20:40, 29:36] = np.nan
+    depth[:, 40:] = 6.0
+    depth[20:40, 34:40] = 1.0  # nor do teeth that reach a lower lip far back: elsewhere there is nothing beside them
+    assert np.isnan(without_islands(depth)[20:40, 34:40]).all()
 
 
 @pytest.mark.parametrize(
