@@ -32,7 +32,7 @@ ROUND = 16.0  # mm between the points that are looked at on the cheeks
 NOISE = 1.5  # mm by which a landmark may be wrong, along each axis
 UNSURE = 0.02  # trust in skin without data, of 1
 #: Squares of deviations that a smile may cost more than a mouth that just opens, and that more than anything that muscles
-#: do. Of 96 scans of six people of ICT-FaceKit with open mouths 29 of 30 smiles cost at most .3 more, and the other faces
+#: do. Of 95 scans of six people of ICT-FaceKit with open mouths 29 of 30 smiles cost at most .3 more, and the other faces
 #: 3.4 or more; mouths that just open cost up to 4.0 more than anything, funnelled ones 3.4 or more, disgust 6.4 or more.
 #: Nor does a face smile whose corners are hardly lifted: those of 32 neutral ones by up to .26 of a smile's lift, but by
 #: .15 where a smile costs as little.
