@@ -6,7 +6,7 @@
 
 The test data's ``ict/make_ict_subjects.py`` makes random people of ICT-FaceKit, each with its neutral face, and scans of them
 with noise, holes and teeth. Measured by ``eval/fit_quality.py``, in the face, against the neutral one. What is built already is
-not built again. Millimetres, mean / 95th percentile, and the worse corner of the mouth.
+not built again. Millimetres, mean / 95th percentile, and the worse corner of the mouth, if it was found.
 """
 
 import argparse
@@ -64,12 +64,12 @@ def main():
                 print(f"{name:20}{seed:8}  {found}", flush=True)
                 continue
             face, off = found["face"], found["landmarks"]["errors"]
-            corner = max(off[mark] for mark in CORNERS if mark in off)
+            corner = max((off[mark] for mark in CORNERS if mark in off), default=np.nan)
             every.append((face["skin_to_scan"]["mean"], face["skin_to_scan"]["p95"], corner))
             told = "".join(f"{pair(face[way]):>16}" for way in ("skin_to_scan", "scan_to_skin"))
             print(f"{name:20}{seed:8}{told}{corner:8.2f}", flush=True)
     if every:
-        mean, far, corner = np.mean(every, axis=0)
+        mean, far, corner = np.nanmean(every, axis=0)
         print(f"{f'all {len(every)}':28}{f'{mean:.3f}/{far:.2f}':>16}{corner:24.2f}")
 
 
