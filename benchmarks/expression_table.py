@@ -24,7 +24,8 @@ def _both(**controls: float) -> dict[str, float]:
     return {f"{name}_{side}": value for name, value in controls.items() for side in "LR"}
 
 
-#: Name -> ICT-FaceKit's controls. On people 7201 to 7206 the rules of `sim.relax` were made; 7301 to 7304 were not looked at.
+#: Name -> ICT-FaceKit's controls. On people 7201 to 7206 the rules of `sim.relax` were made; on 7301 to 7304 only that mouths
+#: are looked for higher up, and that flakes are no teeth.
 EXPRESSIONS = {
     "weak smile": {**_both(mouthSmile=0.35, mouthUpperUp=0.1), "jawOpen": 0.1},
     "smile": {**_both(mouthSmile=0.6, mouthUpperUp=0.2, cheekSquint=0.3), "jawOpen": 0.08},
@@ -78,16 +79,8 @@ def person(folder: Path, out: Path, seed: int, name: str, controls: dict[str, fl
     neutral, scanned = out / "neutral", out / name.replace(" ", "_")
     for where, more in ((neutral, []), (scanned, ["--expr", ",".join(f"{k}={v}" for k, v in controls.items())])):
         if not list(where.glob(f"s{seed}*_scan.ply")):
-            command = [
-                sys.executable,
-                folder / "ict" / "make_ict_subjects.py",
-                "--seed",
-                str(seed),
-                "--out",
-                where,
-                *more,
-            ]
-            subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+            script, options = folder / "ict" / "make_ict_subjects.py", ["--seed", str(seed), "--out", where]
+            subprocess.run([sys.executable, script, *options, *more], check=True, stdout=subprocess.DEVNULL)
     scan, known = (scanned / f"s{seed}_expr_{what}" for what in ("scan.ply", "truth.json"))
     truth, at = (neutral / f"s{seed}_truth.{kind}" for kind in ("ply", "json"))
     return ScannedHead(f"s{seed}_{scanned.name}", scan, known, truth, at, smiles=True)

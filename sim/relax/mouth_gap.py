@@ -100,6 +100,10 @@ def without_islands(depth, lips_only: bool = False) -> np.ndarray:
 
 def in_front(depth, skin) -> np.ndarray:
     """(c, r) bool, islands that hang before the ``skin`` (c, r) bool of a map of depths (c, r) mm: strays and flakes."""
+    depth, skin = (
+        np.pad(depth, 1, constant_values=np.nan),
+        np.pad(skin, 1),
+    )  # so that nothing rolls over from the other side
     islands, count = label(np.isfinite(depth) & ~skin)
     sides, before = np.zeros((2, count + 1))
     for axis in (0, 1):
@@ -108,7 +112,7 @@ def in_front(depth, skin) -> np.ndarray:
             rim = (islands > 0) & (over != islands)
             sides += np.bincount(islands[rim], minlength=count + 1)
             before += np.bincount(islands[rim & beside & (deep > depth)], minlength=count + 1)
-    return (islands > 0) & (before > FLAKE * sides)[islands]
+    return ((islands > 0) & (before > FLAKE * sides)[islands])[1:-1, 1:-1]
 
 
 def smoothed(edges, shares, at) -> np.ndarray:

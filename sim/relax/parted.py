@@ -31,7 +31,6 @@ AJAR = 3.0  # mm between the lips on the scan that are known to be apart otherwi
 CARE = 0.7  # a landmark's deviation, by what is usual for it
 EDGE = 1.0  # mm, the same of a lip's edge
 ASIDE = 0.75  # edges nearer to the corners than this share of the way are not looked for
-BEGUN = 0.26  # share of the way to the corners within which it is asked whether there is a gap
 LINES = 31  # from lip to lip, along which they are
 
 
@@ -58,13 +57,13 @@ def parted_lips(reference: Head, target: Surface, given, lips=None) -> PartedLip
     matrix, _ = similarity(marks, goal)
     forward = -matrix[:, 1] / np.linalg.norm(matrix[:, 1])
     looked, about = np.linspace(-ASIDE, ASIDE, LINES), (lips or {}) | given
-    first = looked[np.abs(looked) < BEGUN]
     least = AJAR if lips else APART
     # The lower lip of a broad smile hangs below the straight ways to the corners, which end in the gap then.
-    arched = bool(lips) and opening(lip_edges(target, about, forward, first), first) < least
-    if opening(lip_edges(target, about, forward, first, arched), first) < least:
+    edges = lip_edges(target, about, forward, looked)
+    if lips and opening(edges, looked) < least:
+        edges = lip_edges(target, about, forward, looked, arched=True)
+    if opening(edges, looked) < least:
         return None
-    edges = lip_edges(target, about, forward, looked, arched)
     pairs, shares = rim_pairs(reference)
     edges = smoothed(edges, looked, shares)
     seen = np.isfinite(edges).all(axis=(1, 2)) & (np.linalg.norm(edges[:, 0] - edges[:, 1], axis=1) > TOLD)
