@@ -2,9 +2,10 @@
 """A head as plain files for programs that have no Blender: meshes as PLY, the rest as JSON, shapes as ``.npz``.
 
 All in mm, Z up, face toward -Y, in the scan's own place. ``skin.ply`` is the surface as Blender draws it, the cage
-subdivided once, with the front of the eyeballs between open lids and a film between open lips. Shapes have the cage's
-own vertices, each where it comes to lie on that surface, the limit of subdivision; landmarks lie there too. A baked
-performance is weights of the shapes over time.
+subdivided once, with the front of the eyeballs between open lids and a film between open lips; ``skin_as_scanned.ply`` is
+the same, vertex by vertex, of a relaxed face with the expression that it was scanned with. Shapes have the cage's own
+vertices, each where it comes to lie on that surface, the limit of subdivision; landmarks lie there too. A baked performance
+is weights of the shapes over time.
 """
 
 import io
@@ -36,6 +37,9 @@ def write_plain(skin: bpy.types.Object, folder) -> None:
     head = as_drawn(cage)
     report = heads.read_report(skin)
     parts = {"skin": seen_skin(cage), **{part: head.parts[part] for part in ("skull", "mandible")}}
+    scanned = shape_keys.as_scanned(skin)
+    if scanned is not None:
+        parts["skin_as_scanned"] = seen_skin(cage.with_vertices({"skin": scanned}))
     for part, mesh in parts.items():
         write_ply(folder / f"{part}.ply", Mesh.from_triangles(mesh.vertices, mesh.triangles))
     write_landmarks(folder / "landmarks.json", head.landmark_positions(), report.get("landmarks_missing", ()))

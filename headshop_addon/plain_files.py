@@ -7,10 +7,11 @@ from ..sim.anatomy.head import Head
 from ..sim.anatomy.storage import write_atomically
 
 #: Everything an export folder may hold; ``shapes.npz`` only once something was baked, ``performance.npz`` only once a
-#: performance was, the maps only of a head that has them.
+#: performance was, the maps only of a head that has them, ``skin_as_scanned.ply`` only where an expression was taken away.
 FILES = (
-    *("skin.ply", "skull.ply", "mandible.ply", "landmarks.json", "skull_landmarks.json", "muscles.json"),
-    *("report.json", "shapes.npz", "performance.npz", "displacement.png", "normal.png"),
+    *("skin.ply", "skin_as_scanned.ply", "skull.ply", "mandible.ply"),
+    *("landmarks.json", "skull_landmarks.json", "muscles.json", "report.json"),
+    *("shapes.npz", "performance.npz", "displacement.png", "normal.png"),
 )
 
 

@@ -94,6 +94,12 @@ def keep_as_scanned(skin: bpy.types.Object, vertices: np.ndarray) -> None:
     bridge.write_positions(skin, vertices, SCANNED)
 
 
+def as_scanned(skin: bpy.types.Object) -> np.ndarray | None:
+    """The skin's vertices (n, 3) mm as scanned; None for a head that was not relaxed."""
+    keys = skin.data.shape_keys
+    return bridge.read_positions(skin, SCANNED) if keys and SCANNED in keys.key_blocks else None
+
+
 def require_editable(skin: bpy.types.Object) -> None:
     """Raise `InputError` if the head is linked: its meshes cannot take shape keys."""
     linked = [obj.name for obj in heads.parts_of(skin).values() if obj.data.library is not None]

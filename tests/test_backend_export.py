@@ -6,6 +6,7 @@ import json
 import numpy as np
 import pytest
 
+from headshop.sim.acting.plain_posing import plainly_posed
 from headshop.sim.adapt.landmarks import read_landmarks
 from headshop.sim.adapt.untangle import sharp
 from headshop.sim.anatomy.seen_skin import behind_lids
@@ -75,7 +76,7 @@ def test_plain_files(bpy, skin, tmp_path, reference):
     from headshop.headshop_addon.plain_files import FILES
 
     write_plain(skin, tmp_path)
-    absent = {"displacement.png", "normal.png", "performance.npz"}  # it was not fitted to a scan, and does not act
+    absent = {"skin_as_scanned.ply", "displacement.png", "normal.png", "performance.npz"}  # not fitted, does not act
     assert {p.name for p in tmp_path.iterdir()} == set(FILES) - absent
     on_surface = drawn(reference.skin.faces, reference.skin.vertices)
     for part in ("skull", "mandible"):
@@ -102,6 +103,22 @@ def test_plain_files(bpy, skin, tmp_path, reference):
         assert shapes["deltas"].shape == (2, *reference.skin.vertices.shape)
         np.testing.assert_allclose(shapes["basis"], on_surface, atol=1e-3)
         assert np.abs(shapes["deltas"]).max() > 1 and shapes["triangles"].max() < len(shapes["basis"])
+
+
+def test_a_relaxed_face_is_written_as_it_was_scanned_too(bpy, skin, tmp_path, reference):
+    from headshop.headshop_addon import shape_keys
+    from headshop.headshop_addon.plain_export import write_plain
+
+    open_mouth = plainly_posed(reference, jaw_open=0.5).skin.vertices
+    shape_keys.keep_as_scanned(skin, open_mouth)
+    write_plain(skin, tmp_path)
+    neutral, scanned = (read_ply(tmp_path / f"{name}.ply") for name in ("skin", "skin_as_scanned"))
+    np.testing.assert_array_equal(scanned.triangles, neutral.triangles)
+    shut, parted = (reference.landmarks.on({"skin": mesh.vertices[: len(open_mouth)]}) for mesh in (neutral, scanned))
+    assert np.linalg.norm(shut["ls"] - shut["li"]) + 8 < np.linalg.norm(parted["ls"] - parted["li"])
+    np.testing.assert_allclose(parted["n"], shut["n"], atol=0.01)
+    on_surface = drawn(reference.skin.faces, open_mouth)
+    assert np.median(np.linalg.norm(scanned.vertices[: len(on_surface)] - on_surface, axis=1)) < 1e-3
 
 
 def test_no_shapes_file_before_a_bake(bpy, reference, tmp_path):
