@@ -9,8 +9,7 @@ import pytest
 from headshop.sim.adapt.closest import Surface
 from headshop.sim.adapt.scan_surface import NO_SKIN
 from headshop.sim.anatomy.landmark_names import SKIN
-from headshop.sim.landmarks import find, looks, placed_face
-from headshop.sim.landmarks import first_look as first
+from headshop.sim.landmarks import filled_in, find, laid_head, looks, placed_face
 from headshop.sim.landmarks.beards import (
     HANGING,
     UNDER_CHIN,
@@ -160,8 +159,8 @@ def test_landmarks_picked_on_a_beard_do_not_pull_the_chin_out_to_it(reference, s
 def test_below_a_beard_no_jaw_is_looked_for_that_the_scan_ends_above(reference, bearded, monkeypatch):
     """What is left of the scan ends at the mouth; that is no end of it."""
     target, _, marks, _ = bearded(*WORN)
-    for name in ("with_unseen_jaw", "unseen_jaw"):
-        monkeypatch.setattr(first, name, lambda *_: pytest.fail("one was"))
+    for at, name in ((laid_head, "with_unseen_jaw"), (filled_in, "unseen_jaw")):
+        monkeypatch.setattr(at, name, lambda *_: pytest.fail("one was"))
     given = {n: p for n, p in _given(marks).items() if n not in JAW}
     assert finish(first_look(reference, target, given, ["beard"])).left_out["beard"] > 0
 

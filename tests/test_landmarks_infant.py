@@ -9,8 +9,7 @@ import pytest
 
 from headshop.sim.adapt.closest import Surface
 from headshop.sim.anatomy.landmark_names import SKIN
-from headshop.sim.landmarks import find, infant, looking, placed_face
-from headshop.sim.landmarks import first_look as first
+from headshop.sim.landmarks import find, infant, laid_head, looking, placed_face
 from headshop.sim.landmarks.first_look import first_look
 from headshop.sim.landmarks.infant import infant_points, infant_space, with_mouth_in_place
 from headshop.sim.landmarks.lip_line import lip_height, lip_line
@@ -238,8 +237,8 @@ def test_what_somebody_picked_on_an_infant_is_told(reference, monkeypatch, of):
         return fit, None
 
     beards = []
-    monkeypatch.setattr(first, "fit_shape", spy)
-    monkeypatch.setattr(first, "without_beards_lead", beardless)
+    monkeypatch.setattr(laid_head, "fit_shape", spy)
+    monkeypatch.setattr(laid_head, "without_beards_lead", beardless)
     finish(first_look(reference, scan, truth, found=("ch_l", "g", "t_r")))
     ((space, pose, told),) = asked
     assert beards == ([] if of == "a child" else [False])
