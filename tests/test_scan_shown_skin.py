@@ -149,7 +149,8 @@ def test_a_cover_that_looks_like_skin_or_is_hardly_seen_tells_nothing(reference,
     some = np.append(np.flatnonzero(~hidden[nearest]), few)
     colour = colour.copy()
     colour[few] = HAIR
-    assert (_asked(reference, points[some], colour[some], hidden) == 1).all()
+    beside = cKDTree(points[few]).query(points[some])[0] > 25
+    assert (_asked(reference, points[some], colour[some], hidden)[beside] > 0.9).all()
     assert (_asked(reference, points + [0, 0, 300.0], colour, hidden) == 1).all()
 
 
@@ -240,3 +241,54 @@ def test_trust_changes_gradually_from_cell_to_cell_and_many_points_count_for_mor
     many = _smooth(asked, at, np.array([1.0, 0.5, 0]), np.array([30, 1, 1]))
     assert (many > even + 0.1).all()
     assert (_smooth(asked, at, np.ones(3), np.ones(3)) == 1).all()
+
+
+def _dotted(reference, points, nearest, share):
+    """(k,) bool: specks of hair on the scalp, and one beside it on the forehead, a ``share`` of the scalp's vertices."""
+    scalp = np.flatnonzero(reference.groups["scalp"] > 0.5)
+    middle = reference.skin.vertices[scalp].mean(axis=0)
+    order = np.argsort(np.arctan2(*(reference.skin.vertices[scalp] - middle)[:, :2].T), kind="stable")
+    chosen = np.zeros(len(reference.skin.vertices), dtype=bool)
+    chosen[scalp[order[: int(share * len(scalp))]]] = True
+    at = reference.landmark_positions()
+    below = points[np.linalg.norm(points - (0.75 * at["tr"] + 0.25 * at["n"]), axis=1).argmin()]
+    return chosen[nearest] | (np.linalg.norm(points - below, axis=1) < 5.0)
+
+
+@pytest.mark.parametrize("kind", [HAIR, [0.75, 0.75, 0.75]])
+def test_specks_of_hair_on_a_scalp_that_is_not_seen_are_not_skin(reference, scanned, kind):
+    points, nearest, colour = scanned
+    hair = _dotted(reference, points, nearest, 0.1)
+    scalp = reference.groups["scalp"][nearest] > 0.5
+    away = cKDTree(reference.skin.vertices[reference.groups["scalp"] > 0.5]).query(points)[0]
+    colour = np.where(hair[:, None], kind, colour)
+    seen = hair | ~scalp
+    trust = _asked(reference, points[seen], colour[seen])
+    specks = _inside(points[seen], hair[seen], 1.0)
+    assert (specks & ~scalp[seen]).sum() > 20 < (specks & scalp[seen]).sum()
+    assert np.quantile(trust[specks], 0.95) < 0.3
+    assert (trust[~hair[seen] & (away[seen] > 25)] == 1).all()
+
+
+def test_a_scalp_that_is_seen_has_its_own_colour(reference, scanned):
+    """Shaved hair, on all of it or a good part."""
+    points, nearest, colour = scanned
+    for share in (0.35, 1.0):
+        hair = _dotted(reference, points, nearest, share)
+        assert (_asked(reference, points, np.where(hair[:, None], HAIR, colour)) == 1).all()
+
+
+def test_what_is_unlike_the_skin_of_a_motley_face_says_nothing_of_hair(reference, scanned):
+    points, nearest, colour = scanned
+    hair = _dotted(reference, points, nearest, 0.1)
+    colour = np.where(hair[:, None], SKIN * 0.4, colour)
+    assert _asked(reference, points, colour)[hair].mean() < 0.4
+    face = (reference.groups["face"][nearest] > 0.5) & _stripes(points)
+    assert (_asked(reference, points, np.where(face[:, None], colour * 0.3, colour)) == 1).all()
+
+
+def test_brows_and_moles_are_not_hair_of_the_scalp(reference, scanned):
+    points, nearest, colour = scanned
+    at = reference.landmark_positions()
+    dark = (reference.groups["brow_l"][nearest] > 0.3) | (np.linalg.norm(points - at["prn"], axis=1) < 5)
+    assert (_asked(reference, points, np.where(dark[:, None], HAIR, colour)) == 1).all()

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How far points of a scan show skin, by their colours: not hair that hangs over its edge, nor eyeballs beside their lids.
+"""How far points of a scan show skin, by their colours: not hair that hangs over its edge, specks of hair on a scalp that is
+not seen, nor eyeballs beside their lids.
 
-Whether a point belongs to either is decided only where it may: near skin that is known to be covered, and near open eyes.
+Whether a point belongs to any is decided only where it may: near skin that is known to be covered, the scalp, and open eyes.
 Thresholds were set on the heads of menpo3d (hair over forehead and temples, whites of eyes painted on the lids),
 Infinite-Realities (bald, eyes shut) and VTK (a face without hair, in coloured light).
 """
@@ -21,6 +22,14 @@ ABOVE = 40.0  # mm: what lies farther above covered skin says nothing of its cov
 LIKE_SKIN, UNLIKE = 0.15, 0.35
 MOST = 0.4  # more of this than a tenth of the skin has: the colours of skin and cover are not to be told apart
 FEWEST = 50  # points that a colour is learnt from
+#: Share of the scalp below which what is unlike the face's skin there are specks of hair, which the scanner lost elsewhere:
+#: .03 to .08 in scans of seven people of ICT-FaceKit, painted with hair; shaved hair on .30 of it says how a scalp looks.
+SPECKS = 0.2
+#: How unlike, as a logarithm of colour, and in terms of what a hundredth of the face's skin is: .33 to .41 on those faces, the
+#: specks .8 and more.
+OTHER, OTHERWISE = (0.5, 0.8), 1.5
+REACH = 6.0  # mm about a vertex in which a scan shows its colour
+HAIRLINE = (15.0, 20.0)  # mm from the scalp, to which such specks reach, and beyond which there are none
 #: Parts of a face whose own colours may be as those of hair.
 OWN_COLOURS = ("brow", "lid_upper", "lid_lower", "lip_upper", "lip_lower", "nostril")
 #: mm from the edges of lids, as above: eyeballs
@@ -46,7 +55,7 @@ def shown_skin(points, colour, skin: Mesh, groups, landmarks, eyes, hidden) -> n
         return np.ones(0)
     at, mean, count = _cells(points, colour)
     light = np.log(np.maximum(mean, DARKEST))
-    trust = np.ones(len(at))
+    trust = 1 - _specks(at, light, skin, groups)
     if hidden is not None:
         ear = (landmarks["t_l"] + landmarks["t_r"]) / 2
         beard = (at[:, 2] < ear[2]) & (at[:, 1] < ear[1])
@@ -99,6 +108,25 @@ def _cover(points, light, skin, groups, hidden, beard):
     low = max(LIKE_SKIN, shade)
     near = np.where(beard, _near(away, BEARDED), _near(away, COVERED)) * ~own[nearest]
     return _rise(like, low, low + UNLIKE - LIKE_SKIN) * near
+
+
+def _specks(points, light, skin, groups):
+    """(k,) 0..1: what is unlike the face's skin on a scalp that shows little else of its kind."""
+    distance, nearest = cKDTree(skin.vertices).query(points, workers=-1)
+    own = _any(groups, OWN_COLOURS, len(skin.vertices))
+    bare = ~own & (groups["face"] > 0.5) & (groups["inner"] < 0.5)
+    bare = bare[nearest] & (distance < BARE)
+    if bare.sum() < FEWEST:
+        return np.zeros(len(points))
+    off = np.linalg.norm(light - np.median(light[bare], axis=0), axis=1)
+    usual = max(OTHERWISE * np.quantile(off[bare], 0.99) / OTHER[0], 1.0)
+    scalp = groups["scalp"] > 0.5
+    away = cKDTree(skin.vertices[scalp]).query(points, distance_upper_bound=HAIRLINE[1], workers=-1)[0]
+    on = _rise(off, *np.multiply(OTHER, usual)) * _near(away, HAIRLINE) * ~own[nearest]
+    if not (on > 0.5).any():
+        return np.zeros(len(points))
+    away = cKDTree(points[on > 0.5]).query(skin.vertices[scalp], distance_upper_bound=REACH)[0]
+    return on if np.isfinite(away).mean() < SPECKS else np.zeros(len(points))
 
 
 def _eyeball(points, light, eye, margin):
