@@ -110,7 +110,7 @@ def test_lids_that_are_seen_to_be_open_are_as_the_scan_has_them_and_others_held(
 @pytest.fixture
 def asked(monkeypatch):
     """The scans of which lips and lids were asked; the work ends there, with a LookupError."""
-    from headshop.sim.landmarks import find, first_look
+    from headshop.sim.landmarks import find, laid_head
 
     scans = []
 
@@ -120,7 +120,7 @@ def asked(monkeypatch):
         yield
 
     monkeypatch.setattr(find, "fit_expression", stop)
-    monkeypatch.setattr(first_look, "fit_expression", stop)
+    monkeypatch.setattr(laid_head, "fit_expression", stop)
     return scans
 
 

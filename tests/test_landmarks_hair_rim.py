@@ -7,7 +7,8 @@ from scipy.spatial import cKDTree
 
 from headshop.sim.adapt.closest import Surface
 from headshop.sim.anatomy.landmark_names import SKIN
-from headshop.sim.landmarks import first_look as first
+from headshop.sim.landmarks import skin_left
+from headshop.sim.landmarks.first_look import first_look
 from headshop.sim.landmarks.hair_rim import BESIDE, RIM, rim_of_hair
 from headshop.sim.landmarks.hidden_skin import EARLESS, likeliest_heights
 from headshop.sim.landmarks.shape_space import shape_space
@@ -148,13 +149,13 @@ def test_what_rises_to_hair_is_left_out_of_a_scan_and_filled_in(reference, space
         near = np.linalg.norm(target.vertices[target.triangles] - place, axis=2).max(axis=1) < 20
         return near, patch
 
-    monkeypatch.setattr(first, "rim_of_hair", rim)
-    look = finish(first.first_look(reference, scan, given))
+    monkeypatch.setattr(skin_left, "rim_of_hair", rim)
+    look = finish(first_look(reference, scan, given))
     assert look.target.closest(place[None], 60.0).distance[0] > 5 > 2 > look.filled.closest(place[None]).distance[0]
     assert set(space.vertices[patch]) <= set(look.hidden) and look.left_out["hair"] > 500
     bare, marks = asked[0]
     assert bare[space.ear > 0.5].all() and bare.mean() < 0.3 and marks is given
-    kept = finish(first.first_look(reference, scan, given, leave_out=("glasses", "beard")))
+    kept = finish(first_look(reference, scan, given, leave_out=("glasses", "beard")))
     assert kept.left_out["hair"] == 0 and len(asked) == 1
 
 
