@@ -100,10 +100,8 @@ def without_islands(depth, lips_only: bool = False) -> np.ndarray:
 
 def in_front(depth, skin) -> np.ndarray:
     """(c, r) bool, islands that hang before the ``skin`` (c, r) bool of a map of depths (c, r) mm: strays and flakes."""
-    depth, skin = (
-        np.pad(depth, 1, constant_values=np.nan),
-        np.pad(skin, 1),
-    )  # so that nothing rolls over from the other side
+    # With a margin, so that nothing rolls over from the other side.
+    depth, skin = np.pad(depth, 1, constant_values=np.nan), np.pad(skin, 1)
     islands, count = label(np.isfinite(depth) & ~skin)
     sides, before = np.zeros((2, count + 1))
     for axis in (0, 1):

@@ -4,7 +4,7 @@ not seen, nor eyeballs beside their lids.
 
 Whether a point belongs to any is decided only where it may: near skin that is known to be covered, the scalp, and open eyes.
 Thresholds were set on the heads of menpo3d (hair over forehead and temples, whites of eyes painted on the lids),
-Infinite-Realities (bald, eyes shut) and VTK (a face without hair, in coloured light).
+Infinite-Realities (bald, eyes shut) and VTK (a face without hair, in coloured light); of specks on people of ICT-FaceKit.
 """
 
 import numpy as np
@@ -23,9 +23,9 @@ LIKE_SKIN, UNLIKE = 0.15, 0.35
 MOST = 0.4  # more of this than a tenth of the skin has: the colours of skin and cover are not to be told apart
 FEWEST = 50  # points that a colour is learnt from
 #: Share of the scalp below which what is unlike the face's skin there are specks of hair, which the scanner lost elsewhere:
-#: .03 to .08 in scans of seven people of ICT-FaceKit, painted with hair; shaved hair on .30 of it says how a scalp looks.
+#: .01 to .10 in scans of ten people of ICT-FaceKit, painted with hair; shaved hair on .38 of it says how a scalp looks.
 SPECKS = 0.2
-#: How unlike, as a logarithm of colour, and in terms of what a hundredth of the face's skin is: .33 to .41 on those faces, the
+#: How unlike, as a logarithm of colour, and in terms of what a hundredth of the face's skin is: .33 to .51 on those faces, the
 #: specks .8 and more.
 OTHER, OTHERWISE = (0.5, 0.8), 1.5
 REACH = 6.0  # mm about a vertex in which a scan shows its colour
@@ -91,12 +91,10 @@ def _cover(points, light, skin, groups, hidden, beard):
 
     beard : (k,) bool, where one may grow
     """
-    distance, nearest = cKDTree(skin.vertices).query(points, workers=-1)
+    distance, nearest, own, bare = _beside(points, skin, groups)
     away = cKDTree(skin.vertices[hidden]).query(points, distance_upper_bound=COVERED[1], workers=-1)[0]
-    own = _any(groups, OWN_COLOURS, len(hidden))
     cover = hidden[nearest] & (distance < ABOVE)
-    bare = ~own & ~hidden & (groups["face"] > 0.5) & (groups["inner"] < 0.5)
-    bare = bare[nearest] & ~beard & (distance < BARE) & ~np.isfinite(away)
+    bare &= ~hidden[nearest] & ~beard & ~np.isfinite(away)
     if min(cover.sum(), bare.sum()) < FEWEST:
         return np.zeros(len(points))
     middle = np.median(light[bare], axis=0)
@@ -106,27 +104,34 @@ def _cover(points, light, skin, groups, hidden, beard):
     if shade > MOST:
         return np.zeros(len(points))
     low = max(LIKE_SKIN, shade)
-    near = np.where(beard, _near(away, BEARDED), _near(away, COVERED)) * ~own[nearest]
+    near = np.where(beard, _near(away, BEARDED), _near(away, COVERED)) * ~own
     return _rise(like, low, low + UNLIKE - LIKE_SKIN) * near
 
 
 def _specks(points, light, skin, groups):
     """(k,) 0..1: what is unlike the face's skin on a scalp that shows little else of its kind."""
-    distance, nearest = cKDTree(skin.vertices).query(points, workers=-1)
-    own = _any(groups, OWN_COLOURS, len(skin.vertices))
-    bare = ~own & (groups["face"] > 0.5) & (groups["inner"] < 0.5)
-    bare = bare[nearest] & (distance < BARE)
+    _, _, own, bare = _beside(points, skin, groups)
     if bare.sum() < FEWEST:
         return np.zeros(len(points))
     off = np.linalg.norm(light - np.median(light[bare], axis=0), axis=1)
     usual = max(OTHERWISE * np.quantile(off[bare], 0.99) / OTHER[0], 1.0)
     scalp = groups["scalp"] > 0.5
     away = cKDTree(skin.vertices[scalp]).query(points, distance_upper_bound=HAIRLINE[1], workers=-1)[0]
-    on = _rise(off, *np.multiply(OTHER, usual)) * _near(away, HAIRLINE) * ~own[nearest]
-    if not (on > 0.5).any():
+    there = _near(away, HAIRLINE) * ~own
+    unlike = (there > 0.5) & (off > OTHER[0])
+    if not unlike.any():
         return np.zeros(len(points))
-    away = cKDTree(points[on > 0.5]).query(skin.vertices[scalp], distance_upper_bound=REACH)[0]
-    return on if np.isfinite(away).mean() < SPECKS else np.zeros(len(points))
+    shown = np.isfinite(cKDTree(points[unlike]).query(skin.vertices[scalp], distance_upper_bound=REACH)[0])
+    return _rise(off, *np.multiply(OTHER, usual)) * there * (shown.mean() < SPECKS)
+
+
+def _beside(points, skin, groups):
+    """Of the skin beside points (k, 3): mm to it (k,), its vertices (k,), whether it may have colours as hair has (k,), and
+    whether it is other skin of the face, near enough to show its colour (k,)."""
+    distance, nearest = cKDTree(skin.vertices).query(points, workers=-1)
+    own = _any(groups, OWN_COLOURS, len(skin.vertices))
+    bare = ~own & (groups["face"] > 0.5) & (groups["inner"] < 0.5)
+    return distance, nearest, own[nearest], bare[nearest] & (distance < BARE)
 
 
 def _eyeball(points, light, eye, margin):
