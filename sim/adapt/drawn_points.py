@@ -6,6 +6,7 @@ fitted is the surface as it is drawn, and data between the vertices counts as mu
 """
 
 from dataclasses import dataclass
+from functools import cached_property, lru_cache
 
 import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix, diags, identity
@@ -39,7 +40,7 @@ class DrawnPoints:
         them, and is to be as far outside the data at its points as inside it between them."""
         return points + SAG * (self.around @ points - points)
 
-    @property
+    @cached_property
     def outer(self) -> np.ndarray:
         """Triangles (o, 3) between points that are seen."""
         return self.triangles[self.seen[self.triangles].all(axis=1)]
@@ -47,7 +48,15 @@ class DrawnPoints:
 
 def drawn_points(faces, free, seen) -> DrawnPoints:
     """The `DrawnPoints` of a cage with ``faces`` (m, 4), of which the vertices ``free`` (n,) bool look for data and
-    ``seen`` (n,) bool can be seen."""
+    ``seen`` (n,) bool can be seen. Kept for those last asked for."""
+    faces = np.ascontiguousarray(faces, dtype=np.int32)
+    return _drawn_points(faces.tobytes(), faces.shape, np.asarray(free).tobytes(), np.asarray(seen).tobytes())
+
+
+@lru_cache(maxsize=2)
+def _drawn_points(faces: bytes, shape, free: bytes, seen: bytes) -> DrawnPoints:
+    faces = np.frombuffer(faces, dtype=np.int32).reshape(shape)
+    free, seen = (np.frombuffer(chosen, dtype=bool) for chosen in (free, seen))
     n = len(free)
     rows, quads = smoother(faces, n)
     pair = edges(faces)

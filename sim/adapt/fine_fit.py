@@ -33,6 +33,7 @@ AGREE = 0.6  # cosine between the normals of skin and scan
 WHOLE = 150.0  # mm²: a piece of data smaller than this is trusted in proportion
 FINE = 0.05  # stiffness below which data in between the cage's vertices is looked for too
 BEGUN, STIFF = 0.2, 0.6  # mm off in the mean: a skin as near as that takes a single stiff round, and how stiff that is
+AT_ONCE = 0.1  # mm off in the mean before that one: a skin as near as that takes the last round next, and only once
 NEAR = 0.045  # mm off in the mean: a skin as near as that takes the last round at once
 LEFT = 0.07  # mm by which the last round may find the skin off, in the mean
 AGAIN = 2  # times at most that it is repeated if it is farther off
@@ -103,16 +104,17 @@ def fine_fit(cage, faces, free, rim, target: Surface, anchors: Anchors, stiffnes
         yield (turn + 1) / turns
         if off <= BEGUN and not turn:
             break
+    near = not turn and off <= AT_ONCE
+    soft, left = ([SCHEDULE[-1]], AT_ONCE) if near else (list(SCHEDULE[len(stiff) :]), LEFT)
     base = undrawn(faces, base + moved, base + moved)
     moved = np.zeros((n, 3))
     smooth.factor = None
     anchors = replace(anchors, sampling=(anchors.sampling @ surface.rows[:n]).tocsr())
-    soft = list(SCHEDULE[len(stiff) :])
     for turn, step in enumerate(soft + soft[-1:] * AGAIN):
         at_once = (NEAR, soft[-1][0]) if step[0] < LAST else None
         moved, off = nearer(base, moved, surface, tracked, anchors, smooth, step, at_once)
         yield (len(stiff) + turn + 1) / turns
-        if off <= (LEFT if turn + 1 >= len(soft) else NEAR) and step[0] < LAST:
+        if off <= (left if turn + 1 >= len(soft) else NEAR) and step[0] < LAST:
             break
     cage = base + moved
     now = surface.rows @ cage

@@ -134,20 +134,23 @@ def between_lids(surface: Surface, reference: Head, given, matrix, margins, plac
     matrix (3, 3) turns the reference into the scan's place; margins (k,), places (k, 3) mm : as `lid_margins` has them
     """
     out = np.zeros(len(surface.triangles), dtype=bool)
-    middle = surface.vertices[surface.triangles].mean(axis=1)
     for side in ("l", "r"):
         lids = [np.isin(margins, np.flatnonzero(np.asarray(reference.groups[f"lid_{x}_{side}"]) > 0.5)) for x in LIDS]
         if min(on.sum() for on in lids) < 3:
             continue
         corners = given[f"en_{side}"], given[f"ex_{side}"]
         frame, scale = _eye_frame(*corners, matrix[:, 2]), np.cbrt(np.linalg.det(matrix))
-        local = (middle - corners[0]) @ frame.T
+        length = np.linalg.norm(corners[1] - corners[0])
+        # Of the whole scan no more is looked at than what lies between the corners in one direction.
+        along = (surface.vertices - corners[0]) @ (frame[0] / length)
+        a, b, c = surface.triangles.T
+        share = (along[a] + along[b] + along[c]) / 3
+        some = np.flatnonzero((share > CORNER) & (share < 1 - CORNER))
+        local = (surface.vertices[surface.triangles[some]].mean(axis=1) - corners[0]) @ frame.T
         upper, lower = (_along((places[on] - corners[0]) @ frame.T, local[:, 0]) for on in lids)
         depth = local[:, 2] - (upper[1] + lower[1]) / 2
-        share = local[:, 0] / np.linalg.norm(corners[1] - corners[0])
         inside = (local[:, 1] < upper[0] - WITHIN * scale) & (local[:, 1] > lower[0] + WITHIN * scale)
-        inside &= (share > CORNER) & (share < 1 - CORNER)
-        out |= inside & (np.abs(depth) < BALL * scale)
+        out[some] |= inside & (np.abs(depth) < BALL * scale)
     return out
 
 

@@ -51,10 +51,11 @@ class SurfacePoints:
 
     def on(self, vertices_of: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Name -> (3,) mm, given the vertices of each part."""
-        return {
-            name: surface_points(vertices_of[part], corners[None], weights[None])[0]
-            for name, part, corners, weights in zip(self.names, self.part, self.corners, self.weights, strict=True)
-        }
+        part, places = np.array(self.part), np.empty((len(self.names), 3))
+        for name in set(self.part):
+            on = part == name
+            places[on] = surface_points(vertices_of[name], self.corners[on], self.weights[on])
+        return dict(zip(self.names, places, strict=True))
 
 
 @dataclass(frozen=True, eq=False)
