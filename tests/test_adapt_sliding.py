@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Warps with sites that slide: against Gaussian conditioning done by hand, and on people whose skin is known."""
 
+from itertools import chain, repeat
+
 import numpy as np
 import pytest
 from scipy.sparse import csr_matrix
@@ -183,28 +185,41 @@ def rounds_of(reference):
     return fine_fit.fine_fit(skin.vertices, skin.faces, free, np.zeros(n, dtype=bool), surface, none)
 
 
+FAR = (fine_fit.AT_ONCE + fine_fit.BEGUN) / 2
+#: How far the skin is off before the first round and before all others, and how many more rounds than in the schedule it takes.
 OFFS = (
-    (0.0, -3),
-    ((fine_fit.NEAR + fine_fit.LEFT) / 2, -2),
-    (fine_fit.BEGUN, fine_fit.AGAIN - 2),
-    (1.0, fine_fit.AGAIN),
+    (0.0, 0.0, -4),
+    (fine_fit.AT_ONCE, fine_fit.AT_ONCE, -4),
+    (fine_fit.AT_ONCE, FAR, fine_fit.AGAIN - 4),
+    (FAR, 0.0, -3),
+    (FAR, (fine_fit.NEAR + fine_fit.LEFT) / 2, -2),
+    (fine_fit.BEGUN, fine_fit.BEGUN, fine_fit.AGAIN - 2),
+    (1.0, 1.0, fine_fit.AGAIN),
 )
 
 
-@pytest.mark.parametrize("off, more", OFFS)
-def test_there_are_as_many_rounds_as_the_skin_is_off_the_data(reference, monkeypatch, off, more):
-    monkeypatch.setattr(fine_fit, "nearer", lambda base, moved, *rest: (moved, off))
+@pytest.mark.parametrize("first, then, more", OFFS)
+def test_there_are_as_many_rounds_as_the_skin_is_off_the_data(reference, monkeypatch, first, then, more):
+    offs = chain([first], repeat(then))
+    monkeypatch.setattr(fine_fit, "nearer", lambda base, moved, *rest: (moved, next(offs)))
     assert len(list(rounds_of(reference))) == len(fine_fit.SCHEDULE) + more
 
 
-def test_a_skin_that_is_near_takes_a_single_stiff_round_and_the_last_soft_one_at_once(reference, monkeypatch):
-    solve, taken = fine_fit.solve_displacement, []
+@pytest.mark.parametrize("first, soft", [(0.0, [5]), (FAR, [3, 5])])
+def test_a_skin_that_is_near_takes_a_single_stiff_round_and_the_last_soft_one_at_once(
+    reference, monkeypatch, first, soft
+):
+    solve, nearer, taken, offs = fine_fit.solve_displacement, fine_fit.nearer, [], iter([first])
 
     def noted(smooth, soft, *rest):
         taken.append(soft)
         return solve(smooth, soft, *rest)
 
+    def as_if(*arguments):
+        moved, off = nearer(*arguments)
+        return moved, next(offs, off)
+
     monkeypatch.setattr(fine_fit, "solve_displacement", noted)
+    monkeypatch.setattr(fine_fit, "nearer", as_if)
     list(rounds_of(reference))
-    softs = [soft for soft, _, _ in fine_fit.SCHEDULE]
-    assert taken == [fine_fit.STIFF, softs[3], softs[-1]]
+    assert taken == [fine_fit.STIFF] + [fine_fit.SCHEDULE[k][0] for k in soft]
