@@ -50,7 +50,9 @@ def drawn_points(faces, free, seen) -> DrawnPoints:
     """The `DrawnPoints` of a cage with ``faces`` (m, 4), of which the vertices ``free`` (n,) bool look for data and
     ``seen`` (n,) bool can be seen. Kept for those last asked for."""
     faces = np.ascontiguousarray(faces, dtype=np.int32)
-    return _drawn_points(faces.tobytes(), faces.shape, np.asarray(free).tobytes(), np.asarray(seen).tobytes())
+    return _drawn_points(
+        faces.tobytes(), faces.shape, *(np.asarray(each, dtype=bool).tobytes() for each in (free, seen))
+    )
 
 
 @lru_cache(maxsize=2)

@@ -141,7 +141,7 @@ def between_lids(surface: Surface, reference: Head, given, matrix, margins, plac
         corners = given[f"en_{side}"], given[f"ex_{side}"]
         frame, scale = _eye_frame(*corners, matrix[:, 2]), np.cbrt(np.linalg.det(matrix))
         length = np.linalg.norm(corners[1] - corners[0])
-        # Of the whole scan no more is looked at than what lies between the corners in one direction.
+        # No more of the scan is looked at than the slab between the corners: a fifteenth of a head.
         along = (surface.vertices - corners[0]) @ (frame[0] / length)
         a, b, c = surface.triangles.T
         share = (along[a] + along[b] + along[c]) / 3
