@@ -194,6 +194,7 @@ OFFS = (
     (FAR, 0.0, -3),
     (FAR, (fine_fit.NEAR + fine_fit.LEFT) / 2, -2),
     (fine_fit.BEGUN, fine_fit.BEGUN, fine_fit.AGAIN - 2),
+    (1.0, 0.0, -1),
     (1.0, 1.0, fine_fit.AGAIN),
 )
 

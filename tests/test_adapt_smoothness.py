@@ -62,6 +62,19 @@ def test_a_system_without_weak_ties_is_stronger_where_there_are_data_and_the_sam
     assert strength.min() > 1 - 1e-9 and strength.max() < 2
 
 
+def test_what_preconditions_has_weak_ties_left_out_where_there_are_data_only(monkeypatch):
+    smooth, rows, there = told_mesh()
+    count, n = rows.shape
+    factorised, seen = smooth_system.factorised, []
+    monkeypatch.setattr(smooth_system, "factorised", lambda matrix: seen.append(matrix) or factorised(matrix))
+    up, pulls = np.tile([0, 0, 1.0], (count, 1)), np.ones((count, 3))
+    solve_displacement(smooth, 0.005, rows, np.ones(count), up, np.full(count, 0.02), pulls, np.zeros((n, 3)))
+    made, alone, data = seen[0].toarray(), smooth.matrix(0.005).toarray(), (rows.T @ rows).toarray()
+    untold = data.diagonal() == 0
+    np.testing.assert_allclose(made[untold], alone[untold], atol=1e-8)
+    assert (made[there] != 0).sum() < 0.8 * ((alone + data)[there] != 0).sum()
+
+
 @pytest.mark.parametrize("start", [0.0, 0.5])
 def test_it_is_solved_as_well_with_weak_ties_left_out(start, monkeypatch):
     smooth, rows, there = told_mesh()
