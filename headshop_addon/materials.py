@@ -13,7 +13,7 @@ from ..sim.mesh import Mesh
 from ..sim.progress import Progress, Work, finish, portion
 from ..sim.scan.iris_colour import iris_colour
 from ..sim.scan.shown_skin import shown_skin
-from . import bridge, heads
+from . import bridge, heads, shape_keys
 from .anatomy_materials import FIBRE, REST, anatomy_material
 from .detail_images import images_of
 from .eye_materials import EYE, IRIS, IRIS_COLOUR, eye_material
@@ -42,13 +42,13 @@ def dressing(skin: bpy.types.Object) -> Work:
     yield Progress(0.0, "Dressing the head")
     head = heads.read_head(skin)
     axes = head_axes(head)
-    scan = _coloured_scan(skin)
-    seen = None if scan is None else ScanColour(scan, head.parts["skin"].vertices).turned_to(head.parts["skin"])
+    scan, shown = _coloured_scan(skin), _as_scanned(skin, head)
+    seen = None if scan is None else ScanColour(scan, shown.skin.vertices).turned_to(shown.skin)
     iris = None if seen is None else iris_colour(seen.scan, head.eyes)
     hidden = bridge.read_attribute(skin.data, "hidden")
     if seen is not None:
-        at = head.landmark_positions()
-        seen.trust = shown_skin(seen.points, seen.colour, head.parts["skin"], head.groups, at, head.eyes, hidden)
+        at = shown.landmark_positions()
+        seen.trust = shown_skin(seen.points, seen.colour, shown.skin, head.groups, at, head.eyes, hidden)
     objects = heads.parts_of(skin)
     for part, obj in objects.items():
         mesh = head.parts[part]
@@ -57,7 +57,7 @@ def dressing(skin: bpy.types.Object) -> Work:
             yield Progress(0.1, "Painting the skin")
             paint_skin(obj, mesh, head.groups, place, {n: axes @ p for n, p in head.landmark_positions().items()})
             unseen = unseen_skin(mesh, head.groups["inner"], hidden)
-            own = yield from portion(_own_skin(skin, mesh, seen, unseen), 0.2, 0.85)
+            own = yield from portion(_own_skin(skin, shown.skin, seen, unseen), 0.2, 0.85)
             yield Progress(0.85, "Dressing the head")
         elif part in ("eye_l", "eye_r"):
             write_vectors(obj.data, EYE, eye_coordinates(mesh, head.eyes[part == "eye_r"], axes[2]))
@@ -72,6 +72,12 @@ def dressing(skin: bpy.types.Object) -> Work:
             obj = muscles[muscle.name]
             write_vectors(obj.data, FIBRE, fibre_coordinates(muscle))
             _fill_slots(obj, [_material("muscle")])
+
+
+def _as_scanned(skin: bpy.types.Object, head: Head) -> Head:
+    """The ``head`` with the expression that it was scanned with: what its scan shows lies beside that, not the neutral face."""
+    vertices = shape_keys.as_scanned(skin)
+    return head if vertices is None else head.with_vertices({"skin": vertices})
 
 
 def head_axes(head: Head) -> np.ndarray:

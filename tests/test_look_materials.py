@@ -4,6 +4,7 @@
 import numpy as np
 import pytest
 
+from headshop.sim.acting.plain_posing import plainly_posed
 from headshop.sim.anatomy.head import MATERIALS
 
 
@@ -272,6 +273,27 @@ def test_a_coloured_scan_gives_the_head_a_skin_of_its_own(bpy, reference, made_o
     assert len(bpy.data.images) == images and skin.data.materials[0] == material
     _, pixels = _painted(skin)
     assert (pixels[:, 0] > pixels[:, 2] + 0.2).mean() < 0.03
+
+
+def test_a_relaxed_face_has_the_colours_of_the_one_that_was_scanned(reference, made_of):
+    from headshop.headshop_addon import materials, shape_keys
+    from headshop.headshop_addon.skin_material import COLOUR
+    from headshop.sim.mesh import Mesh
+
+    lips = np.maximum(reference.groups["lip_upper"], reference.groups["lip_lower"])
+    seen = (reference.groups["face"] > 0.5) & (reference.groups["inner"] < 0.5)
+    scanned = plainly_posed(reference, jaw_open=0.8).skin
+    painted = np.where(lips[:, None] > 0.5, (0.8, 0.1, 0.1), (0.1, 0.1, 0.8)).astype(np.float32)
+    shown = scanned.triangles[seen[scanned.triangles].all(axis=1)]
+    skin = made_of(Mesh.from_triangles(scanned.vertices, shown, colour=painted))
+    shape_keys.keep_as_scanned(skin, scanned.vertices)
+    materials.dress_head(skin)
+    colour = np.empty(4 * len(lips), dtype=np.float32)
+    skin.data.attributes[COLOUR].data.foreach_get("color", colour)
+    red, _, blue, _ = colour.reshape(-1, 4).T
+    assert (red > 2 * blue)[seen & (lips > 0.9)].mean() > 0.9  # not what lies where the lips are closed now
+    assert (red > blue)[seen & (lips < 0.01)].mean() < 0.01  # as a chin where the lower lip was
+    assert skin.data.shape_keys.key_blocks[shape_keys.SCANNED].value == 0
 
 
 def test_the_portrait_turns_with_the_head(bpy, skin, reference):
