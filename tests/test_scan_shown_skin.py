@@ -270,6 +270,20 @@ def test_specks_of_hair_on_a_scalp_that_is_not_seen_are_not_skin(reference, scan
     assert (trust[~hair[seen] & (away[seen] > 25)] == 1).all()
 
 
+def test_a_speck_at_a_temple_is_hair_and_one_on_a_cheek_is_not(reference, scanned):
+    points, nearest, colour = scanned
+    away = cKDTree(reference.skin.vertices[reference.groups["scalp"] > 0.5]).query(points)[0]
+    seen = reference.groups["scalp"][nearest] <= 0.5
+    temple = seen & (points[:, 2] > reference.landmark_positions()["sci_l"][2]) & (away > 20) & (away < 22)
+    cheek = seen & (reference.groups["cheek_l"][nearest] > 0.9) & (away > 35)
+    for place, hair in ((temple, True), (cheek, False)):
+        middle = points[place][len(points[place]) // 2]
+        speck = seen & (np.linalg.norm(points - middle, axis=1) < 6.0) & ((away > 19) & (away < 23) | (not hair))
+        trust = _asked(reference, points[seen], np.where(speck[:, None], HAIR, colour)[seen])
+        assert speck.sum() > 10
+        assert np.median(trust[speck[seen]]) < 0.3 if hair else (trust == 1).all()
+
+
 def test_a_scalp_that_is_seen_has_its_own_colour(reference, scanned):
     """Shaved hair, on all of it or a good part."""
     points, nearest, colour = scanned

@@ -29,7 +29,7 @@ SPECKS = 0.2
 #: specks .8 and more.
 OTHER, OTHERWISE = (0.5, 0.8), 1.5
 REACH = 6.0  # mm about a vertex in which a scan shows its colour
-HAIRLINE = (15.0, 20.0)  # mm from the scalp, to which such specks reach, and beyond which there are none
+HAIRLINE = (23.0, 28.0)  # mm from the scalp to which specks reach (23 at a temple), and beyond which there are none
 #: Parts of a face whose own colours may be as those of hair.
 OWN_COLOURS = ("brow", "lid_upper", "lid_lower", "lip_upper", "lip_lower", "nostril")
 #: mm from the edges of lids, as above: eyeballs
