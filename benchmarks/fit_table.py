@@ -20,8 +20,10 @@ from pathlib import Path
 import numpy as np
 from scanned_heads import TWELVE, ScannedHead, scanned_heads, test_data
 
+from headshop.sim.adapt.landmarks import read_landmarks
 from headshop.sim.adapt.scan_surface import scan_surface
 from headshop.sim.anatomy.storage import load_head
+from headshop.sim.landmarks.find import find_landmarks
 from headshop.sim.landmarks.first_look import first_look
 from headshop.sim.mesh import Mesh
 from headshop.sim.progress import finish
@@ -82,11 +84,9 @@ def measured(head: ScannedHead, mode: str, output: Path, folder: Path) -> dict |
     command += [] if known is None else ["--truth-landmarks", known]
     found = told_by(command)
     if (out / "skin_as_scanned.ply").is_file():
-        found["as_scanned"] = told_by([*command[:2], as_scanned(out), head.scan, "--face-only"])["face"]["skin_to_scan"]
+        found["as_scanned"] = from_as_scanned(out, head.scan, folder)
     if any(json.loads((out / "report.json").read_text())["fit"]["left_out_mm2"].values()):
-        found["on_its_skin"] = told_by([*command[:2], as_scanned(out), skin_of_scan(head, out), "--face-only"])["face"][
-            "skin_to_scan"
-        ]
+        found["on_its_skin"] = from_as_scanned(out, skin_of_scan(head, mode, out), folder)
     answer.write_text(json.dumps(found))
     return found
 
@@ -108,20 +108,26 @@ def landmarks_of(head: ScannedHead, mode: str, out: Path) -> Path:
     return path
 
 
-def as_scanned(out: Path) -> Path:
-    """A head's skin with the expression that it was scanned with, and its landmarks: the folder of them."""
-    folder, relaxed = out / "as_scanned", out / "skin_as_scanned.ply"
-    folder.mkdir(exist_ok=True)
-    shutil.copy(relaxed if relaxed.is_file() else out / "skin.ply", folder / "skin.ply")
-    shutil.copy(out / "landmarks.json", folder)
-    return folder
+def from_as_scanned(out: Path, scan: Path, folder: Path) -> dict:
+    """What the script says of the face of a head that is exported to ``out``, as it was scanned, beside ``scan``."""
+    at, relaxed = out / "as_scanned", out / "skin_as_scanned.ply"
+    at.mkdir(exist_ok=True)
+    shutil.copy(relaxed if relaxed.is_file() else out / "skin.ply", at / "skin.ply")
+    shutil.copy(out / "landmarks.json", at)
+    return told_by([sys.executable, folder / "eval" / "fit_quality.py", at, scan, "--face-only"])["face"][
+        "skin_to_scan"
+    ]
 
 
-def skin_of_scan(head: ScannedHead, out: Path) -> Path:
-    """The file of what a build of ``head`` that is exported to ``out`` takes for skin, of its scan."""
+def skin_of_scan(head: ScannedHead, mode: str, out: Path) -> Path:
+    """The file of what a build of ``head`` with the landmarks of ``mode`` takes for skin, of its scan."""
     reference, scan = load_head(), clean_scan(read_ply(head.scan))[0]
-    known = {n: np.array(p) for n, p in json.loads((out / "landmarks.json").read_text())["landmarks"].items()}
-    shown = finish(first_look(reference, scan_surface(reference, scan, known), known, scan=scan)).target
+    if mode == "found":
+        known = finish(find_landmarks(scan, reference)).sure()
+    else:
+        known = read_landmarks(landmarks_of(head, mode, out))
+    told = known if mode == "found" else ()
+    shown = finish(first_look(reference, scan_surface(reference, scan, known), known, found=told, scan=scan)).target
     path = out / "skin_of_scan.ply"
     write_ply(path, Mesh.from_triangles(shown.vertices, shown.triangles))
     return path
