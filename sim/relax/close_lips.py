@@ -22,26 +22,33 @@ CORNERS = ("ch_l", "ch_r")
 
 
 def lips_closed(rest: Rest, skin, matrix) -> np.ndarray:
-    """Skin (n, 3) mm with each pair of lip points as far apart as on the reference.
+    """Skin (n, 3) mm with each pair of lip points as far above each other as on the reference.
 
-    matrix (3, 3) turns and scales the reference into the skin's place. The displacement is the one of least bending.
+    matrix (3, 3) turns and scales the reference into the skin's place. The displacement is the one of least bending, straight
+    up and down: lips of which one hangs over the other stay so.
     """
     start = rest.head.skin.vertices
     apart, want = pairs_apart(rest, matrix)
     away = cKDTree(start[rest.lip_rim]).query(start)[0]
     hold = 1e-4 + HOLD * np.clip((away - NEAR) / (FAR - NEAR), 0, 1) ** 2
     system = rest.energy + diags(hold) + MEET * (apart.T @ apart)
-    return skin + factorised(system)(MEET * (apart.T @ (want - apart @ skin)))
+    up = matrix[:, 2] / np.linalg.norm(matrix[:, 2])
+    raised = factorised(system)(MEET * (apart.T @ ((want - apart @ skin) @ up)))
+    return skin + np.outer(raised, up)
 
 
 def lips_rounded(rest: Rest, skin, matrix) -> np.ndarray:
     """Skin (n, 3) mm whose lips differ as smoothly from the reference's as can be: a stretched lip swells again.
 
-    matrix (3, 3) as in `lips_closed`; the lips keep meeting.
+    matrix (3, 3) as in `lips_closed`; the lips come to meet where the one is that lies farther back, under the other.
     """
     start = rest.head.skin.vertices
     away = cKDTree(start[rest.lip_pairs.ravel()]).query(start)[0]
-    return smoothest(rest, skin, matrix, away / BEYOND)
+    pairs = rest.lip_pairs[rest.rim[rest.lip_pairs].all(axis=1)]
+    depth = ((skin - start @ matrix.T) @ matrix[:, 1])[pairs]
+    behind = pairs[np.arange(len(pairs)), depth.argmax(axis=1)]
+    held = coo_matrix((np.ones(len(behind)), (np.arange(len(behind)), behind)), shape=(len(behind), len(start))).tocsr()
+    return smoothest(rest, skin, matrix, away / BEYOND, held)
 
 
 def corners_smoothed(rest: Rest, skin, matrix) -> np.ndarray:

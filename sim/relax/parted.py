@@ -27,7 +27,9 @@ STILL = (
 )
 APART = 6.0  # mm between the lips on the scan, and by what all is explained with, from which on they count as parted
 TOLD = 3.5
-AJAR = 3.0  # mm between the lips on the scan that are known to be apart otherwise; noise parts closed lips by 2.9
+#: mm between the lips on the scan that are known to be apart otherwise, and by what all is explained with. Noise parts closed
+#: lips by 2.9; of a tube's 5 mm seven landmarks explained 2.5.
+AJAR, LITTLE = 3.0, 1.5
 CARE = 0.7  # a landmark's deviation, by what is usual for it
 EDGE = 1.0  # mm, the same of a lip's edge
 ASIDE = 0.75  # edges nearer to the corners than this share of the way are not looked for
@@ -71,7 +73,7 @@ def parted_lips(reference: Head, target: Surface, given, lips=None) -> PartedLip
     expression = explained(reference, names, marks, goal, rim, edges)
     middle = pairs[np.abs(shares).argmin()]
     gap = np.diff((reference.skin.vertices + expression.modelled)[middle], axis=0)[0]
-    return PartedLips(expression, rim, edges) if np.linalg.norm(gap) > TOLD else None
+    return PartedLips(expression, rim, edges) if np.linalg.norm(gap) > (LITTLE if lips else TOLD) else None
 
 
 def rim_pairs(reference: Head):
