@@ -51,6 +51,7 @@ class Rest:
     folds : pairs of neighbouring triangles that turn back on each other
     lip_rim (k,) : vertices of the rim that are lips
     lip_pairs (k, 2) : vertices of upper and lower lip that lie on each other, each the other's nearest
+    seen_pairs (k, 2) : those of them on the rim
     organs : ``eye_l``, ``eye_r``, ``mouth``, ``nostrils`` -> rows of the inner skin that belong to them
     behind (n,) int : how many edges behind the rim a vertex of the inner skin lies, 0 for what is seen
     needs : bone -> (k,) mm of tissue that must remain over each of its vertices
@@ -72,6 +73,7 @@ class Rest:
         lips = np.maximum(group(reference, "lip_upper"), group(reference, "lip_lower")) > 0.5
         self.lip_rim = np.flatnonzero(self.rim & lips)
         self.lip_pairs = self._lip_pairs()
+        self.seen_pairs = self.lip_pairs[self.rim[self.lip_pairs].all(axis=1)]
         self.organs, self.behind = self._organs()
         cover = SkinCover(skin, group(reference, "inner"), bone.LINING)
         self.needs = {name: bone.least_depth(cover.depth(reference.parts[name].vertices)) for name in BONES}

@@ -44,9 +44,8 @@ def lips_rounded(rest: Rest, skin, matrix) -> np.ndarray:
     """
     start = rest.head.skin.vertices
     away = cKDTree(start[rest.lip_pairs.ravel()]).query(start)[0]
-    pairs = rest.lip_pairs[rest.rim[rest.lip_pairs].all(axis=1)]
-    depth = ((skin - start @ matrix.T) @ matrix[:, 1])[pairs]
-    behind = pairs[np.arange(len(pairs)), depth.argmax(axis=1)]
+    depth = ((skin - start @ matrix.T) @ matrix[:, 1])[rest.seen_pairs]
+    behind = np.take_along_axis(rest.seen_pairs, depth.argmax(axis=1)[:, None], axis=1)[:, 0]
     held = coo_matrix((np.ones(len(behind)), (np.arange(len(behind)), behind)), shape=(len(behind), len(start))).tocsr()
     return smoothest(rest, skin, matrix, away / BEYOND, held)
 

@@ -101,12 +101,11 @@ def relaxed(reference: Head, skin, fitted, unseen=None, teeth=()) -> Relaxed:
     people = people[: offsets.size, : offsets.size]
     muscles, plain = ([name for name in table.names if not name.startswith(left)] for left in (CHIN, (*CHIN, *PURSING)))
     cage, rows = reference.skin.vertices, (sampling @ as_drawn).tocsr()
-    upper = rest.lip_pairs[rest.rim[rest.lip_pairs].all(axis=1), 0]
+    upper = rest.seen_pairs[:, 0]
     lip = upper[np.abs(cage[upper, 0]).argmin()]
     about = (table, cage, reference.jaw, rows, offsets, people, noise)
     found = explain(*about, muscles, known)
     if max(found.muscles[name] for name in muscles if name.startswith(LOWER_LIP)) < PURSED:
-        muscles = plain
         found = explain(*about, plain, known)
     told = told_of_smile(reference, table, as_drawn, lip, found.jaw)
     lifts = lifted(told, table, found)
