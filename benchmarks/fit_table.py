@@ -8,13 +8,19 @@ Measured by the test data's ``eval/fit_quality.py``, which see for the definitio
 face, in the place of the scan, and the face as it was scanned against the scan; the same "on its skin" against what of the
 scan a build takes for skin, where it leaves something out (flat ends, what the lips hold, hair ...). What is built already
 is not built again: a run that was cut off goes on. Millimetres, mean / 95th percentile.
+
+    python benchmarks/fit_table.py ct_headsq -o out/open --build="--relax never --leave-out held_by_lips,hair"
+
+measures heads that were built otherwise, here one with its lips as they were held open and its top as it was cut.
 """
 
 import argparse
 import json
+import shlex
 import shutil
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -51,6 +57,7 @@ def main():
     parser.add_argument("names", nargs="*", help="heads whose name contains one of these (default: all)")
     parser.add_argument("-o", "--output", type=Path, required=True, help="folder of what is built and measured")
     parser.add_argument("--modes", nargs="+", choices=MODES, default=MODES)
+    parser.add_argument("--build", type=shlex.split, default=[], help="further options of headshop build (own folder)")
     args = parser.parse_args()
     folder = test_data()
     print(f"{'head':26}{'landmarks':10}" + "".join(f"{title:>13}" for title in TITLES) + "  mesh, bone")
@@ -59,17 +66,32 @@ def main():
             continue
         for mode in args.modes:
             if mode == "found" or head.landmarks is not None:
-                print(f"{head.name:26}{mode:10}" + row(measured(head, mode, args.output, folder)), flush=True)
+                print(
+                    f"{head.name:26}{mode:10}" + row(measured(head, mode, args.output, folder, args.build)), flush=True
+                )
 
 
-def measured(head: ScannedHead, mode: str, output: Path, folder: Path) -> dict | str:
-    """What the script says of ``head``, built with the landmarks of ``mode``, or why it could not be built."""
+def measured(head: ScannedHead, mode: str, output: Path, folder: Path, options: Sequence[str] = ()) -> dict | str:
+    """What the script says of ``head``, built with the landmarks of ``mode`` and these ``options``, or why it could not be
+    built."""
     out = output / f"{head.name}_{mode}"
     answer = out.with_suffix(".json")
     if answer.is_file():
         return json.loads(answer.read_text())
     out.parent.mkdir(parents=True, exist_ok=True)
-    command = [sys.executable, "-m", "headshop", "build", head.scan, "--detail", "0", "--quiet", "--export", out]
+    command = [
+        sys.executable,
+        "-m",
+        "headshop",
+        "build",
+        head.scan,
+        "--detail",
+        "0",
+        "--quiet",
+        "--export",
+        out,
+        *options,
+    ]
     command += ["-o", out.with_suffix(".blend")]
     if mode != "found":
         command += ["--landmarks", landmarks_of(head, mode, out)]

@@ -48,7 +48,7 @@ def dressing(skin: bpy.types.Object) -> Work:
     hidden = bridge.read_attribute(skin.data, "hidden")
     if seen is not None:
         at = shown.landmark_positions()
-        seen.trust = shown_skin(seen.points, seen.colour, shown.skin, head.groups, at, head.eyes, hidden)
+        seen.trust = shown_skin(seen.points, seen.colour, shown.skin, head.groups, at, head.eyes, hidden, seen.ends)
     objects = heads.parts_of(skin)
     for part, obj in objects.items():
         mesh = head.parts[part]

@@ -13,6 +13,7 @@ from scipy.spatial import cKDTree
 from ..sim.mesh import Mesh, vertex_normals
 from ..sim.progress import Progress, Work
 from ..sim.scan.colour_space import LUMINANCE, to_linear, to_srgb
+from ..sim.scan.shown_skin import ends_of
 from ..sim.scan.specks import specks
 from ..sim.scan.texture import has_pictures, strewn, texel_size
 from ..sim.scan.winding import faces_away
@@ -35,13 +36,14 @@ class ScanColour:
     scan : Mesh in mm, with colours, standing where the skin stands
     about (k, 3) mm : of a scan with pictures on it, only what is near these points is looked at (None: all of it)
 
-    It has the ``scan``; where pictures on it show more than its vertices, as points between those; the ``size`` in pixels
-    of an image that shows all of it; and of what is looked at the ``points`` (k, 3) mm, their linear ``colour`` (k, 3), and the
-    ``trust`` (k,) 0..1, at first 1, that they show what is asked for, such as skin.
+    It has the ``scan``, where pictures on it show more than its vertices, as points between those; ``ends`` (m, 3) mm, where
+    its surface ends; the ``size`` in pixels of an image that shows all of it; and of what is looked at the ``points`` (k, 3)
+    mm, their linear ``colour`` (k, 3), and the ``trust`` (k,) 0..1, at first 1, that they show what is asked for, such as skin.
     """
 
     def __init__(self, scan: Mesh, about: np.ndarray | None = None):
         whole, normals = ~specks(scan), vertex_normals(scan.vertices, scan.triangles)
+        self.ends = ends_of(scan.vertices, scan.triangles[whole[scan.triangles].all(axis=1)])
         self.size = SIZE
         chosen = _looked_at(scan, whole, about)
         if chosen.any():

@@ -178,18 +178,24 @@ def test_what_is_not_trusted_gives_no_colour_and_does_not_hold_what_is_spread(re
 def test_a_head_is_dressed_in_what_shows_skin(reference, made_of, monkeypatch):
     from headshop.headshop_addon import bridge, materials
 
-    skin = made_of(_coloured_scan(reference))
+    scan = _coloured_scan(reference)
+    before = scan.triangles[(scan.vertices[:, 1] < 0)[scan.triangles].all(axis=1)]
+    skin = made_of(scan.from_triangles(scan.vertices, before, colour=scan.colour))
     bridge.write_attribute(skin.data, "hidden", reference.groups["scalp"] > 0.5)
-    asked = []
+    asked, ended = [], []
 
-    def shown(points, colour, mesh, groups, landmarks, eyes, hidden):
+    def shown(points, colour, mesh, groups, landmarks, eyes, hidden, ends):
         asked.append((len(mesh.vertices), len(groups["face"]), len(landmarks) > 50, len(eyes), int(hidden.sum())))
+        ended.append(ends)
         return (points[:, 0] < 0).astype(float)
 
     monkeypatch.setattr(materials, "shown_skin", shown)
     materials.dress_head(skin)
     count = len(reference.skin.vertices)
     assert asked == [(count, count, True, 2, int((reference.groups["scalp"] > 0.5).sum()))]
+    assert (
+        len(ended[0]) > 50 and (np.abs(ended[0][:, 1]) < 15).mean() > 0.5
+    )  # where it was cut; the rest, lids and lips
     _, pixels = _painted(skin)
     assert (pixels[:, 0] > pixels[:, 2] + 0.2).mean() < 0.02  # red, which is on the left
 

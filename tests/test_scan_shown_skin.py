@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from headshop.sim.mesh import edges
-from headshop.sim.scan.shown_skin import CELL, _smooth, shown_skin
+from headshop.sim.scan.shown_skin import CELL, _smooth, ends_of, shown_skin
 
 SKIN, HAIR, WHITE = np.array([0.35, 0.2, 0.12]), np.array([0.01, 0.008, 0.006]), np.array([0.3, 0.3, 0.28])
 
@@ -25,9 +25,9 @@ def scanned(reference):
     return points, cKDTree(reference.skin.vertices).query(points)[1], colour
 
 
-def _asked(reference, points, colour, hidden=None, at=None, eyes=None):
+def _asked(reference, points, colour, hidden=None, at=None, eyes=None, ends=()):
     marks = reference.landmark_positions() if at is None else at
-    return shown_skin(points, colour, reference.skin, reference.groups, marks, eyes or reference.eyes, hidden)
+    return shown_skin(points, colour, reference.skin, reference.groups, marks, eyes or reference.eyes, hidden, ends)
 
 
 def _scalp(reference):
@@ -322,3 +322,72 @@ def test_brows_and_moles_are_not_hair_of_the_scalp(reference, scanned):
     dark = brow[nearest] | (np.linalg.norm(points - at["prn"], axis=1) < 5)
     trust = _asked(head, points, np.where(dark[:, None], HAIR, colour))
     assert (trust[brow[nearest]] > 0.99).all() and (trust[np.linalg.norm(points - at["prn"], axis=1) < 5] == 1).all()
+
+
+@pytest.fixture(scope="module")
+def cut_off(reference, scanned):
+    """What of the points lies before the temples' hair, where it ends, and the colours; mm to there."""
+    points, _, colour = scanned
+    at = reference.landmark_positions()
+    before = (at["ft_l"][1] + at["ft_r"][1]) / 2 + 12 - points[:, 1]
+    ends = points[np.abs(before) < 0.5]
+    return points[before > 0], ends, colour[before > 0], cKDTree(ends).query(points[before > 0])[0]
+
+
+def test_hair_where_a_scan_ends_above_the_eyes_is_not_skin(reference, cut_off):
+    points, ends, colour, away = cut_off
+    at = reference.landmark_positions()
+    high = (points[:, 2] > at["ex_l"][2] + 32) & (points[:, 2] < at["tr"][2])  # above the tails of the brows
+    hair = high & (away < 7)
+    colour = np.where(hair[:, None], 0.3 * colour, colour)  # darker, and of skin's own hue, as in coloured light
+    trust = _asked(reference, points, colour, ends=ends)
+    sure = _inside(points, hair)
+    assert sure.sum() > 100
+    assert np.median(trust[sure]) < 0.1
+    assert np.quantile(trust[sure], 0.98) < 0.5, "so little counts as nothing"
+    assert trust[_inside(points, ~hair)].mean() > 0.99
+    assert (_asked(reference, points, colour) == 1).all(), "nobody said where the scan ends"
+    wide = np.where((high & (away < 13))[:, None] & ~hair[:, None], 0.3 * colour, colour)
+    fading = _asked(reference, points, wide, ends=ends)[high & (away > 11) & (away < 12)]
+    assert 0.3 < fading.mean() < 0.8
+    shade = np.where(hair[:, None], 2.4 * colour, colour)  # a quarter darker
+    assert _asked(reference, points, shade, ends=ends)[hair].mean() > 0.95
+
+
+def test_dark_skin_is_skin_below_the_eyes_far_from_where_a_scan_ends_and_on_brows(reference, cut_off):
+    points, ends, colour, away = cut_off
+    at = reference.landmark_positions()
+    ex = at["ex_l"][2]
+    low = (points[:, 2] < ex) & (away < 7)
+    far = (points[:, 2] > ex) & (away > 16) & (away < 24)
+    own = reference.groups["brow_l"] + reference.groups["brow_r"] > 0.3
+    brow = own[cKDTree(reference.skin.vertices).query(points)[1]]
+    for dark in (low, far):
+        assert (_asked(reference, points, np.where(dark[:, None], 0.3 * colour, colour), ends=ends) == 1).all()
+    trust = _asked(reference, points, np.where(brow[:, None], 0.1 * colour, colour), ends=points[brow])
+    assert trust[_inside(points, brow)].min() > 0.9
+
+
+def test_a_shaven_scalp_keeps_its_colour_to_where_the_scan_ends(reference, scanned):
+    points, nearest, colour = scanned
+    scalp = _scalp(reference)[nearest]
+    top = reference.skin.vertices[:, 2].max()
+    shaven = np.where(scalp[:, None], 0.5 * colour, colour)
+    ends = points[scalp & (points[:, 2] > top - 30)]
+    assert (_asked(reference, points, shaven, ends=ends) == 1).all()
+
+
+def test_what_ends_where_no_skin_is_seen_beside_it_says_nothing(reference, cut_off):
+    points, ends, colour, away = cut_off
+    dark = np.where(((away < 7) & (points[:, 0] > 0))[:, None], 0.3 * colour, colour)
+    assert _asked(reference, points, dark, ends=ends).min() < 0.1
+    for seen in (away < 12, (away < 12) | (points[:, 0] < 0)):  # none, and that of the other side
+        here = seen & (away < np.where(points[:, 0] > 0, 12, np.inf)) & (np.abs(points[:, 0]) > 30)
+        assert (_asked(reference, points[here], dark[here], ends=ends) == 1).all()
+
+
+def test_a_scan_ends_at_sides_of_one_triangle():
+    square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0.5, 0.5, 0], [9, 9, 9]], dtype=float)
+    fan = [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]]
+    assert sorted(map(tuple, ends_of(square, np.array(fan)))) == sorted(map(tuple, square[:4]))
+    assert ends_of(square, np.array([*fan, [1, 0, 3], [3, 2, 1]])).shape == (0, 3)

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How far points of a scan show skin, by their colours: not hair that hangs over its edge, specks of hair on a scalp that is
-not seen, nor eyeballs beside their lids.
+"""How far points of a scan show skin, by their colours: not hair that hangs over its edge, at which the scan ends, or of which
+specks are on a scalp that is not seen, nor eyeballs beside their lids.
 
-Whether a point belongs to any is decided only where it may: near skin that is known to be covered, the scalp, and open eyes.
+Whether a point belongs to any is decided only where it may: near skin that is known to be covered, where a scan ends above the
+eyes, the scalp, and open eyes.
 Thresholds were set on the heads of menpo3d (hair over forehead and temples, whites of eyes painted on the lids),
 Infinite-Realities (bald, eyes shut) and VTK (a face without hair, in coloured light); of specks on people of ICT-FaceKit.
 """
@@ -28,6 +29,9 @@ SPECKS = 0.2
 #: How unlike, as a logarithm of colour, and in terms of what a hundredth of the face's skin is: .33 to .51 on those faces, the
 #: specks .8 and more.
 OTHER, OTHERWISE = (0.5, 0.8), 1.5
+#: mm from where a scan ends, above the eyes, within which it is hair that is so much darker, as a logarithm of light, than the
+#: skin beside it, if that is no farther away than this.
+ENDING, DARK_AS_HAIR, SKIN_BESIDE = (10.0, 14.0), (0.45, 0.8), (40.0, 50.0)
 REACH = 6.0  # mm about a vertex in which a scan shows its colour
 HAIRLINE = (23.0, 28.0)  # mm from the scalp to which specks reach (23 at a temple), and beyond which there are none
 #: Parts of a face whose own colours may be as those of hair.
@@ -45,11 +49,12 @@ AROUND = 12  # cells that are averaged
 DARKEST = 0.002  # linear light, beneath which colours are noise
 
 
-def shown_skin(points, colour, skin: Mesh, groups, landmarks, eyes, hidden) -> np.ndarray:
+def shown_skin(points, colour, skin: Mesh, groups, landmarks, eyes, hidden, ends=()) -> np.ndarray:
     """(k,) 0..1: how far ``points`` (k, 3) mm of a scan with linear colours (k, 3) show skin, as far as can be told.
 
     skin : the head's, where the scan is, upright, facing -Y, with its ``groups`` of vertices, name -> (n,) 0..1
     landmarks : name -> (3,) mm; eyes : of the head, left and right; hidden : (n,) bool, covered skin, or None
+    ends : (m, 3) mm, where the scan ends, see `ends_of`
     """
     if not len(points):
         return np.ones(0)
@@ -60,10 +65,18 @@ def shown_skin(points, colour, skin: Mesh, groups, landmarks, eyes, hidden) -> n
         ear = (landmarks["t_l"] + landmarks["t_r"]) / 2
         beard = (at[:, 2] < ear[2]) & (at[:, 1] < ear[1])
         trust *= 1 - _cover(at, light, skin, groups, np.asarray(hidden, dtype=bool), beard)
+    trust *= 1 - _fringe(at, light, skin, groups, landmarks, np.reshape(ends, (-1, 3)))
     for side, eye in zip("lr", eyes, strict=True):
         if np.linalg.norm(landmarks[f"ps_{side}"] - landmarks[f"pi_{side}"]) > OPEN:
             trust *= 1 - _eyeball(at, light, eye, _margin(skin, groups, side))
     return _smooth(points, at, trust, count)
+
+
+def ends_of(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """(m, 3) mm: those of a scan's vertices (n, 3) at which it ends, on sides that belong to one of its triangles (t, 3)."""
+    sides = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2).astype(np.int64), axis=1)
+    side, count = np.unique(sides @ [len(vertices), 1], return_counts=True)
+    return vertices[np.unique(np.divmod(side[count == 1], len(vertices)))]
 
 
 def _cells(points, colour):
@@ -119,10 +132,36 @@ def _specks(points, light, skin, groups):
     away = cKDTree(skin.vertices[scalp]).query(points, distance_upper_bound=HAIRLINE[1], workers=-1)[0]
     there = _near(away, HAIRLINE) * ~own
     unlike = (there > 0.5) & (off > OTHER[0])
-    if not unlike.any():
-        return np.zeros(len(points))
-    shown = np.isfinite(cKDTree(points[unlike]).query(skin.vertices[scalp], distance_upper_bound=REACH)[0])
-    return _rise(off, *np.multiply(OTHER, usual)) * there * (shown.mean() < SPECKS)
+    return _rise(off, *np.multiply(OTHER, usual)) * there * _rare(points[unlike], skin, groups)
+
+
+def _rare(points, skin, groups):
+    """Whether little of the scalp is seen to look as these points (k, 3) do, which are unlike skin: else it looks like that."""
+    if not len(points):
+        return False
+    scalp = skin.vertices[groups["scalp"] > 0.5]
+    return np.isfinite(cKDTree(points).query(scalp, distance_upper_bound=REACH)[0]).mean() < SPECKS
+
+
+def _fringe(points, light, skin, groups, landmarks, ends):
+    """(k,) 0..1: what is much darker than the skin beside it, where the scan ``ends`` (m, 3) above the eyes: hair."""
+    out = np.zeros(len(points))
+    if not len(ends):
+        return out
+    distance, nearest, own, bare = _beside(points, skin, groups)
+    away = cKDTree(ends).query(points, distance_upper_bound=ENDING[1], workers=-1)[0]
+    eyes = np.mean([landmarks[f"ex_{side}"][2] for side in "lr"])
+    may = (points[:, 2] > eyes) & ~own & (distance < BARE) & (groups["inner"][nearest] < 0.5)
+    asked, beside = np.flatnonzero(may & np.isfinite(away)), np.flatnonzero(may & ~np.isfinite(away))
+    if not len(asked) or min(len(beside), bare.sum()) < FEWEST:
+        return out
+    bright = np.log(np.exp(light) @ LUMINANCE)
+    distance, index = cKDTree(points[beside]).query(points[asked], k=FEWEST, workers=-1)
+    usual = np.median(bright[beside[index]], axis=1)
+    near = _near(away[asked], ENDING) * _near(distance[:, -1], SKIN_BESIDE)
+    out[asked] = _rise(usual - bright[asked], *DARK_AS_HAIR) * near
+    dark = ~own & (bright < np.median(bright[bare]) - DARK_AS_HAIR[0])
+    return out * _rare(points[dark], skin, groups)
 
 
 def _beside(points, skin, groups):
