@@ -66,6 +66,13 @@ def vertex_normals(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     return out / np.where(length > 0, length, 1)
 
 
+def vertex_areas(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """(n,) a third of the triangles around each vertex, mm²."""
+    a, b, c = (vertices[triangles[:, k]] for k in range(3))
+    area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
+    return np.bincount(triangles.ravel(), np.repeat(area, 3), minlength=len(vertices)) / 3
+
+
 def cross_sides(a, b, c) -> np.ndarray:
     """(3, m): the cross product of the sides ``b - a`` and ``c - a``; all as planes (3, m), which is fastest."""
     (ux, uy, uz), (vx, vy, vz) = b - a, c - a

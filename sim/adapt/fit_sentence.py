@@ -4,6 +4,7 @@
 import numpy as np
 
 from ..anatomy.head import Head
+from ..mesh import vertex_areas
 
 #: What is said -> groups of the skin that make it up; ``_l`` and ``_r`` are added where a head has sides.
 REGIONS = {
@@ -33,13 +34,6 @@ SMILES_CLOSED = (
 SIDED = ("eyelids", "cheek", "ear")
 FITTED = 0.3  # a vertex counts as fitted from here on
 MOST, ALL = 0.4, 0.1  # share of a region that was fitted, below which it counts as invented for the most part, wholly
-
-
-def vertex_areas(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """(n,) mm²: a third of the triangles around each vertex."""
-    a, b, c = (vertices[triangles[:, k]] for k in range(3))
-    area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 6
-    return np.bincount(triangles.ravel(), np.repeat(area, 3), minlength=len(vertices))
 
 
 def fitted_shares(head: Head, fitted: np.ndarray) -> dict[str, float]:

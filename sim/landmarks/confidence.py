@@ -97,8 +97,8 @@ def like_ears(space: ShapeSpace, fit: ShapeFit, target: Surface) -> dict[str, fl
     on = fit.trust * (np.abs(np.nan_to_num(fit.distance, nan=9.0)) < LIES)
     normals = vertex_normals(fit.points, space.triangles)
     out = {}
-    for side, sign in (("l", 1), ("r", -1)):
-        ear = np.flatnonzero((space.ear > 0.5) & (sign * space.points[:, 0] > 0) & (fit.trust > 0))
+    for side in "lr":
+        ear = np.flatnonzero((space.ear > 0.5) & space.on_side(side) & (fit.trust > 0))
         found = target.closest(fit.points[ear], NEAR_EAR * fit.pose.scale)
         ear, seen = ear[found.found], found.normals[found.found]
         if len(ear) == 0:

@@ -143,7 +143,7 @@ def fit_shape(
     hairy = hairy if hair is None else hairy | hair
     area = space.area / PATCH * np.where(hairy, HAIR, 1.0)
     bare = looking if hair is None else looking[~hair[looking]]
-    ears = {side: bare[(space.ear[bare] > 0.5) & ((space.points[bare, 0] > 0) == (side == "l"))] for side in "lr"}
+    ears = {side: bare[(space.ear[bare] > 0.5) & space.on_side(side)[bare]] for side in "lr"}
     for done, (variance, reach, width, noise) in enumerate(rounds):
         shaped = space.shaped(coefficients)
         points = scale * shaped @ turn.T + shift

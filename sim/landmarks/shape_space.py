@@ -93,6 +93,10 @@ class ShapeSpace:
     weights: np.ndarray
     size: float = 1.0
 
+    def on_side(self, side: str) -> np.ndarray:
+        """(n,) bool: the points on the subject's left, ``l``, or right, ``r``."""
+        return (self.points[:, 0] > 0) == (side == "l")
+
     @property
     def of_infants(self) -> bool:
         """Whether it is that of `infant.infant_space`."""

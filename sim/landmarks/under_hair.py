@@ -202,7 +202,7 @@ def ear_found(space: ShapeSpace, fit: ShapeFit, target: Surface, side: str) -> f
 
 
 def _ear(space, side):
-    return (space.ear > EAR) & ((space.points[:, 0] > 0) == (side == "l"))
+    return (space.ear > EAR) & space.on_side(side)
 
 
 def under_hair(space: ShapeSpace, fit: ShapeFit, target: Surface) -> np.ndarray:

@@ -75,13 +75,6 @@ class Surface:
         return point, near[row, best], np.linalg.norm(point - points, axis=1)
 
 
-def vertex_areas(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """(n,) a third of the triangles around each vertex, mm²."""
-    a, b, c = (vertices[triangles[:, k]] for k in range(3))
-    area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
-    return np.bincount(triangles.ravel(), np.repeat(area, 3), minlength=len(vertices)) / 3
-
-
 def cotangent_stiffness(vertices: np.ndarray, triangles: np.ndarray, floor: float = 0.05) -> sparse.csr_matrix:
     """(n, n) positive semi-definite Laplacian with cotangent weights, no weight under ``floor`` (keeps it a mean)."""
     n = len(vertices)

@@ -10,8 +10,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..anatomy.head import Head
-from ..mesh import vertex_normals
-from .geometry import Surface, cotangent_stiffness, short_diagonals, smoothed, vertex_areas
+from ..mesh import vertex_areas, vertex_normals
+from .geometry import Surface, cotangent_stiffness, short_diagonals, smoothed
 from .gingiva import ATTACHED, attached
 from .parameters import Parameters
 from .structures import Layers
