@@ -66,9 +66,8 @@ def main():
             continue
         for mode in args.modes:
             if mode == "found" or head.landmarks is not None:
-                print(
-                    f"{head.name:26}{mode:10}" + row(measured(head, mode, args.output, folder, args.build)), flush=True
-                )
+                found = measured(head, mode, args.output, folder, args.build)
+                print(f"{head.name:26}{mode:10}" + row(found), flush=True)
 
 
 def measured(head: ScannedHead, mode: str, output: Path, folder: Path, options: Sequence[str] = ()) -> dict | str:
@@ -79,20 +78,8 @@ def measured(head: ScannedHead, mode: str, output: Path, folder: Path, options: 
     if answer.is_file():
         return json.loads(answer.read_text())
     out.parent.mkdir(parents=True, exist_ok=True)
-    command = [
-        sys.executable,
-        "-m",
-        "headshop",
-        "build",
-        head.scan,
-        "--detail",
-        "0",
-        "--quiet",
-        "--export",
-        out,
-        *options,
-    ]
-    command += ["-o", out.with_suffix(".blend")]
+    command = [sys.executable, "-m", "headshop", "build", head.scan, "--detail", "0", "--quiet", *options]
+    command += ["-o", out.with_suffix(".blend"), "--export", out]
     if mode != "found":
         command += ["--landmarks", landmarks_of(head, mode, out)]
     done = subprocess.run(command, capture_output=True, text=True)

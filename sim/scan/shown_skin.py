@@ -65,7 +65,7 @@ def shown_skin(points, colour, skin: Mesh, groups, landmarks, eyes, hidden, ends
         ear = (landmarks["t_l"] + landmarks["t_r"]) / 2
         beard = (at[:, 2] < ear[2]) & (at[:, 1] < ear[1])
         trust *= 1 - _cover(at, light, skin, groups, np.asarray(hidden, dtype=bool), beard)
-    trust *= 1 - _fringe(at, light, skin, groups, landmarks, np.reshape(ends, (-1, 3)))
+    trust *= 1 - _at_ends(at, light, skin, groups, landmarks, np.reshape(ends, (-1, 3)))
     for side, eye in zip("lr", eyes, strict=True):
         if np.linalg.norm(landmarks[f"ps_{side}"] - landmarks[f"pi_{side}"]) > OPEN:
             trust *= 1 - _eyeball(at, light, eye, _margin(skin, groups, side))
@@ -143,7 +143,7 @@ def _rare(points, skin, groups):
     return np.isfinite(cKDTree(points).query(scalp, distance_upper_bound=REACH)[0]).mean() < SPECKS
 
 
-def _fringe(points, light, skin, groups, landmarks, ends):
+def _at_ends(points, light, skin, groups, landmarks, ends):
     """(k,) 0..1: what is much darker than the skin beside it, where the scan ``ends`` (m, 3) above the eyes: hair."""
     out = np.zeros(len(points))
     if not len(ends):
