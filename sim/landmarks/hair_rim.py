@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..adapt.closest import Surface
-from .hidden_skin import EARLESS, SEEN, TRUSTED, UNSEEN, likeliest_heights
+from .hidden_skin import EARLESS, SEEN, TRUSTED, likeliest_heights
 from .shape_fit import ShapeFit, pairs
 from .shape_space import ShapeSpace
 from .under_hair import in_face, over
@@ -18,6 +18,8 @@ RIM = 16.0  # mm from hair
 #: mm higher than expected, from which on it is hair: within the face's outline, where much of it may be skin, and outside.
 IN_FACE, HIGHER = 5.0, 1.0
 MOST = 0.5  # of what lies over a point of the skin
+#: mm, how far about the rim skin is looked at, and of its heights their deviation and how far they go together.
+ABOUT, HEIGHTS = 60.0, (4.0, 25.0)
 BESIDE = 8.0  # mm outside of that outline, which tells only roughly where hair begins
 
 
@@ -33,16 +35,15 @@ def rim_of_hair(
     none = np.zeros(len(target.triangles), dtype=bool), np.zeros(len(fit.points), dtype=bool)
     if not hair.any():
         return none
-    about, spread, together = UNSEEN
     away = cKDTree(space.points[hair]).query(space.points)[0]
     rim = (away < RIM) & ~bare
     place, trust, normals = pairs(space, fit.points, target, 2 * SEEN * fit.pose.scale)
-    known = np.flatnonzero((away >= RIM) & (away < RIM + about) & (trust > TRUSTED) & (space.ear < EARLESS))
+    known = np.flatnonzero((away >= RIM) & (away < RIM + ABOUT) & (trust > TRUSTED) & (space.ear < EARLESS))
     if not rim.any() or len(known) == 0:
         return none
     off = np.einsum("ij,ij->i", place[known] - fit.points[known], normals[known])
     expected = np.zeros(len(fit.points))
-    expected[rim] = likeliest_heights(space.points[known], off, space.points[rim], spread, together)
+    expected[rim] = likeliest_heights(space.points[known], off, space.points[rim], HEIGHTS)
     _, near, _, high = over(fit, space, target)
     on = (near >= 0) & rim[near]
     least = np.where(in_face(space, fit, given, BESIDE), IN_FACE, HIGHER) * fit.pose.scale

@@ -24,8 +24,9 @@ TRUSTED = 0.3  # of `ShapeFit.trust`
 #: Of `ShapeSpace.ear`: from there on a place tells how this ear is shaped, not where the skin beside it lies.
 EARLESS = 0.05
 #: mm, of skin behind something, of such of which landmarks tell, and of skin that nothing shows: how far about it is looked,
-#: and of heights their deviation and how far they go together.
-COVERED, TOLD, UNSEEN = (30.0, 2.0, 9.0), (45.0, 3.0, 20.0), (60.0, 4.0, 25.0)
+#: and of heights their deviation and how far they go together. Far from what is seen there are two kinds: ridges and furrows
+#: of a brow, say, end soon; as one kind of heights they went on as waves up a forehead that is not seen.
+COVERED, TOLD, UNSEEN = (30.0, (2.0, 9.0)), (45.0, (3.0, 20.0)), (60.0, (4.0, 60.0), (2.0, 12.0))
 ROUGH = 0.5  # mm: deviation of each height
 ALIKE = 0.8  # correlation of left and right
 
@@ -71,7 +72,7 @@ def with_hidden_skin(
     heights : `COVERED`, `TOLD` or `UNSEEN`, how those of a scan vary there
     picks : name -> (3,) mm, landmarks that are known there
     """
-    about, spread, together = heights
+    about, *kinds = heights
     patch = space.triangles[hidden[space.triangles].any(axis=1)]
     if len(patch) == 0:
         return left
@@ -91,14 +92,18 @@ def with_hidden_skin(
         )
         off = np.r_[off, np.einsum("ij,ij->i", np.array(list(picks.values())) - laid, across)]
         there = np.concatenate([there, picked])
-    out = likeliest_heights(there, off, space.points[used], spread, together)
+    out = likeliest_heights(there, off, space.points[used], *kinds)
     points = fit.points[used] + out[:, None] * normals[used]
     return left.beside(points, corners.reshape(-1, 3))
 
 
-def likeliest_heights(there, off, places, spread: float, together: float) -> np.ndarray:
+def likeliest_heights(there, off, places, *kinds: tuple[float, float]) -> np.ndarray:
     """(k,) mm: how far a scan most likely stands off at ``places`` (k, 3) mm on the reference, if it does by ``off`` (j,) at
-    ``there`` (j, 3) mm. spread, together : as in `COVERED`."""
-    system = alike(there, there, together, ALIKE)
-    system[np.diag_indices_from(system)] += (ROUGH / spread) ** 2
-    return alike(places, there, together, ALIKE) @ cho_solve(cho_factor(system), off)
+    ``there`` (j, 3) mm. kinds : of heights that add up, deviation and how far they go together, as in `COVERED`."""
+
+    def together(at):
+        return sum((spread / kinds[0][0]) ** 2 * alike(at, there, reach, ALIKE) for spread, reach in kinds)
+
+    system = together(there)
+    system[np.diag_indices_from(system)] += (ROUGH / kinds[0][0]) ** 2
+    return together(places) @ cho_solve(cho_factor(system), off)

@@ -10,7 +10,7 @@ from headshop.sim.anatomy.landmark_names import SKIN
 from headshop.sim.landmarks import skin_left
 from headshop.sim.landmarks.first_look import first_look
 from headshop.sim.landmarks.hair_rim import BESIDE, RIM, rim_of_hair
-from headshop.sim.landmarks.hidden_skin import EARLESS, likeliest_heights
+from headshop.sim.landmarks.hidden_skin import EARLESS
 from headshop.sim.landmarks.shape_space import shape_space
 from headshop.sim.landmarks.under_hair import in_face
 from headshop.sim.mesh import vertex_normals
@@ -157,10 +157,3 @@ def test_what_rises_to_hair_is_left_out_of_a_scan_and_filled_in(reference, space
     assert bare[space.ear > 0.5].all() and bare.mean() < 0.3 and marks is given
     kept = finish(first_look(reference, scan, given, leave_out=("glasses", "beard")))
     assert kept.left_out["hair"] == 0 and len(asked) == 1
-
-
-def test_likeliest_heights_go_on_as_they_begin_and_fade_out():
-    there = np.array([[x, y, 0.0] for x in range(-20, 1, 2) for y in range(-20, 21, 4)], dtype=float)
-    places = np.array([[3.0, 0, 0], [20.0, 0, 0], [400.0, 0, 0]])
-    near, beyond, far = likeliest_heights(there, np.full(len(there), 2.0), places, 3.0, 30.0)
-    assert near == pytest.approx(2.0, abs=0.2) and 0.3 < beyond < near and far == pytest.approx(0.0, abs=1e-6)

@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Skin that a scan does not show goes on from what it shows as heads do: as full, without its ridges."""
+
+import numpy as np
+import pytest
+
+from headshop.sim.adapt.closest import Surface
+from headshop.sim.landmarks.hidden_skin import UNSEEN, likeliest_heights, unseen_scalp, with_hidden_skin
+from headshop.sim.landmarks.shape_space import shape_space
+from headshop.sim.mesh import vertex_normals
+
+
+@pytest.fixture(scope="module")
+def space(reference):
+    return shape_space(reference)
+
+
+def below_brows(space, points):
+    """Those as a scan that ends above the brows, and mm from there down to each of the points (n,)."""
+    down = space.landmarks(space.points)["sci_l"][2] + 6 - space.points[:, 2]
+    return Surface(points, space.triangles[(down > 0)[space.triangles].all(axis=1)]), down
+
+
+def test_likeliest_heights_go_on_as_they_begin_and_fade_out():
+    there = np.array([[x, y, 0.0] for x in range(-20, 1, 2) for y in range(-20, 21, 4)], dtype=float)
+    places = np.array([[3.0, 0, 0], [20.0, 0, 0], [400.0, 0, 0]])
+    near, beyond, far = likeliest_heights(there, np.full(len(there), 2.0), places, (3.0, 30.0))
+    assert near == pytest.approx(2.0, abs=0.2) and 0.3 < beyond < near and far == pytest.approx(0.0, abs=1e-6)
+
+
+def test_a_forehead_that_is_not_seen_has_no_ridges_of_the_brow(space, laid):
+    """Ridges of 2 mm between and above the eyes end there: as heights of one kind they went on as waves."""
+    fit, normals = laid(space, space.points), vertex_normals(space.points, space.triangles)
+    _, down = below_brows(space, space.points)
+    ridges = 2.0 * np.cos(2 * np.pi * space.points[:, 0] / 40) * (np.abs(down - 5) < 12) * (space.points[:, 1] < 0)
+    scan, _ = below_brows(space, space.points + ridges[:, None] * normals)
+    hidden = unseen_scalp(space, fit, scan)
+    assert hidden.sum() > 150
+    waves = {}
+    for name, heights in {"one kind": (60.0, (4.0, 25.0)), "two": UNSEEN}.items():
+        filled = with_hidden_skin(space, fit, hidden, scan, heights)
+        front = hidden & (down > -60) & (space.points[:, 1] < -20)
+        waves[name] = np.abs(filled.closest(space.points[front], 9.0).distance).max()
+    assert front.sum() > 20 and waves["two"] < 0.7 * waves["one kind"]
+
+
+def test_a_forehead_that_is_not_seen_is_as_full_as_the_face(space, laid):
+    fit, normals = laid(space, space.points), vertex_normals(space.points, space.triangles)
+    scan, down = below_brows(space, space.points + 2.0 * normals)
+    hidden = unseen_scalp(space, fit, scan)
+    filled = with_hidden_skin(space, fit, hidden, scan, UNSEEN)
+    front = hidden & (down > -50) & (space.points[:, 1] < -20)
+    full = np.abs(filled.closest(space.points[front], 9.0).distance)
+    assert front.sum() > 20 and 0.9 < full.min() < full.max() < 2.3
