@@ -26,7 +26,7 @@ EARLESS = 0.05
 #: mm, of skin behind something, of such of which landmarks tell, and of skin that nothing shows: how far about it is looked,
 #: and of heights their deviation and how far they go together. Far from what is seen there are two kinds: ridges and furrows
 #: of a brow, say, end soon; as one kind of heights they went on as waves up a forehead that is not seen.
-COVERED, TOLD, UNSEEN = (30.0, (2.0, 9.0)), (45.0, (3.0, 20.0)), (60.0, (4.0, 60.0), (2.0, 12.0))
+COVERED, TOLD, UNSEEN = (30.0, (2.0, 9.0)), (45.0, (3.0, 20.0)), (60.0, (4.0, 45.0), (2.0, 12.0))
 ROUGH = 0.5  # mm: deviation of each height
 ALIKE = 0.8  # correlation of left and right
 
