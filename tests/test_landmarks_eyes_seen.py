@@ -259,6 +259,16 @@ def test_along_an_eye_that_is_not_seen_no_crease_is_looked_for(reference, seen_s
     assert asked == ["r"] and set(shown.shut) == set(BOTH)
 
 
+def test_eyes_with_a_slit_along_the_lids_are_not_blank(reference, seen_skin, monkeypatch):
+    """Of a mask with shut eyes the slits' edges, and a fold above them, were taken for margins of blank eyes."""
+    target, marks = seen_skin(BOTH)
+    space, told = shape_space(reference), {f"{n}_{s}": marks[f"{n}_{s}"] for n in ("ps", "pi", "ex") for s in BOTH}
+    monkeypatch.setattr(expression, "blank_eyes", lambda *_: told)
+    scan = with_slit(target, marks)
+    _, shown = finish(fit_expression(space, scan, finish(fit_shape(space, scan, HERE))))
+    assert set(shown.shut) == set(BOTH) and shown.lids == {}
+
+
 def test_where_neither_eye_is_seen_both_are_looked_at(seen_skin):
     target, marks = seen_skin()
     brow = target.without(target.vertices[target.triangles][:, :, 2].min(axis=1) < marks["ps_l"][2] + 2)

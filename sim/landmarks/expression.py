@@ -88,7 +88,10 @@ def _fit_lids(space, target, fit, parted, told, scan):
     gaps = gaps_in_eyes(*laid, sides)
     eyeballs = eyeballs_seen(*laid)
     known_open = gaps.show_open or bool(eyeballs) or bool(corners)
-    seen = corners | open_lids(*laid, eyeballs, sides) if known_open else blank_eyes(*laid, sides)
+    if known_open:
+        seen = corners | open_lids(*laid, eyeballs, sides)
+    else:  # a slit along lids that meet may look like the outline of blank eyes
+        seen = {} if gaps.show_shut else blank_eyes(*laid, sides)
     if seen:
         lids = told_of_open_lids(space, fit, seen)
         return (yield from changed(Expression(parted), fit.coefficients, lids)), Expression(parted, lids=seen)
