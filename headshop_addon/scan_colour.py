@@ -10,10 +10,9 @@ import numpy as np
 from scipy.ndimage import distance_transform_edt
 from scipy.spatial import cKDTree
 
-from ..sim.mesh import Mesh, vertex_normals
+from ..sim.mesh import Mesh, ends_of, vertex_normals
 from ..sim.progress import Progress, Work
 from ..sim.scan.colour_space import LUMINANCE, to_linear, to_srgb
-from ..sim.scan.shown_skin import ends_of
 from ..sim.scan.specks import specks
 from ..sim.scan.texture import has_pictures, strewn, texel_size
 from ..sim.scan.winding import faces_away

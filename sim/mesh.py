@@ -97,6 +97,13 @@ def edges(faces: np.ndarray) -> np.ndarray:
     return np.stack([key // span, key % span], axis=1).astype(np.int32)
 
 
+def ends_of(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """(m, 3) mm: those of a surface's vertices (n, 3) at which it ends, on sides that belong to one of its triangles (t, 3)."""
+    sides = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2).astype(np.int64), axis=1)
+    side, count = np.unique(sides @ [len(vertices), 1], return_counts=True)
+    return vertices[np.unique(np.divmod(side[count == 1], len(vertices)))]
+
+
 def surface_points(vertices: np.ndarray, corners: np.ndarray, weights: np.ndarray) -> np.ndarray:
     """(k, 3) points from vertex indices (k, 3) and barycentric weights (k, 3)."""
     return np.einsum("kij,ki->kj", vertices[corners], weights)

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from headshop.sim.mesh import edges
-from headshop.sim.scan.shown_skin import CELL, _smooth, ends_of, shown_skin
+from headshop.sim.mesh import edges, ends_of
+from headshop.sim.scan.shown_skin import CELL, _smooth, shown_skin
 
 SKIN, HAIR, WHITE = np.array([0.35, 0.2, 0.12]), np.array([0.01, 0.008, 0.006]), np.array([0.3, 0.3, 0.28])
 

@@ -18,7 +18,8 @@ RIM = 16.0  # mm from hair
 #: mm higher than expected, from which on it is hair: within the face's outline, where much of it may be skin, and outside.
 IN_FACE, HIGHER = 5.0, 1.0
 MOST = 0.5  # of what lies over a point of the skin
-#: mm, how far about the rim skin is looked at, and of its heights their deviation and how far they go together.
+#: mm, how far about the rim skin is looked at, and of its heights their deviation and how far they go together. One kind, not
+#: two as of skin that nothing shows: the rim is next to what is seen, and how high hair rises above that was set with this.
 ABOUT, HEIGHTS = 60.0, (4.0, 25.0)
 BESIDE = 8.0  # mm outside of that outline, which tells only roughly where hair begins
 

@@ -54,7 +54,7 @@ def shown_skin(points, colour, skin: Mesh, groups, landmarks, eyes, hidden, ends
 
     skin : the head's, where the scan is, upright, facing -Y, with its ``groups`` of vertices, name -> (n,) 0..1
     landmarks : name -> (3,) mm; eyes : of the head, left and right; hidden : (n,) bool, covered skin, or None
-    ends : (m, 3) mm, where the scan ends, see `ends_of`
+    ends : (m, 3) mm, where the scan ends, see `mesh.ends_of`
     """
     if not len(points):
         return np.ones(0)
@@ -70,13 +70,6 @@ def shown_skin(points, colour, skin: Mesh, groups, landmarks, eyes, hidden, ends
         if np.linalg.norm(landmarks[f"ps_{side}"] - landmarks[f"pi_{side}"]) > OPEN:
             trust *= 1 - _eyeball(at, light, eye, _margin(skin, groups, side))
     return _smooth(points, at, trust, count)
-
-
-def ends_of(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """(m, 3) mm: those of a scan's vertices (n, 3) at which it ends, on sides that belong to one of its triangles (t, 3)."""
-    sides = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2).astype(np.int64), axis=1)
-    side, count = np.unique(sides @ [len(vertices), 1], return_counts=True)
-    return vertices[np.unique(np.divmod(side[count == 1], len(vertices)))]
 
 
 def _cells(points, colour):
