@@ -20,6 +20,7 @@ from .open_lids import open_lids, told_of_open_lids
 from .picked import moved
 from .shape_fit import CHANGE, REST, Expression, ShapeFit, Told, fit_shape, part_of
 from .shape_space import ShapeSpace
+from .winks import winking
 
 FAR = 3.0  # mm that a point of the skin without data counts as
 AROUND_MOUTH = 35.0  # mm
@@ -84,9 +85,16 @@ def _fit_lids(space, target, fit, parted, told, scan):
     marks = space.landmarks(fit.points)
     corners = socket_corners(marks, fit.matrix, target)
     laid = marks | corners, fit.matrix, target
-    sides = eyes_shown(*laid)  # eyes are open or shut alike: one that is not seen as the other
-    gaps = gaps_in_eyes(*laid, sides)
+    sides = eyes_shown(*laid)  # an eye that is not seen is as the other
     eyeballs = eyeballs_seen(*laid)
+    lines = lid_lines(space, fit, target, sides)
+    wink = winking({side: gaps_in_eyes(*laid, side) for side in sides}, lines) if len(sides) == 2 else None
+    if wink is not None:
+        seen = open_lids(*laid, eyeballs, sides.replace(wink, ""))
+        one = Expression(parted, (wink,), lids=seen)
+        lids = told_of_open_lids(space, fit, seen).and_of(told_of_lids(space, fit, {wink: lines[wink]}))
+        return (yield from changed(one, fit.coefficients + _shutting(space, fit, one.shut), lids)), one
+    gaps = gaps_in_eyes(*laid, sides)
     known_open = gaps.show_open or bool(eyeballs) or bool(corners)
     if known_open:
         seen = corners | open_lids(*laid, eyeballs, sides)
@@ -95,7 +103,7 @@ def _fit_lids(space, target, fit, parted, told, scan):
     if seen:
         lids = told_of_open_lids(space, fit, seen)
         return (yield from changed(Expression(parted), fit.coefficients, lids)), Expression(parted, lids=seen)
-    lines, share = lid_lines(space, fit, target, sides), shut_share(space, fit)
+    share = shut_share(space, fit)
     seen_share = {side: share[side] for side in sides}
     by_colours = None if known_open else open_by_colours(scan, *laid[:2], sides)
     shut = shut_by_sight(gaps, lines, seen_share) if by_colours is None else not by_colours
@@ -106,8 +114,14 @@ def _fit_lids(space, target, fit, parted, told, scan):
         wide = Expression(parted, wide=True)
         return (yield from changed(wide, fit.coefficients)), wide
     both = Expression(parted, ("l", "r"))
-    shutting = fit.coefficients + sum((1 - share[side]) * space.shut[side] for side in both.shut)
+    shutting = fit.coefficients + _shutting(space, fit, both.shut)
     return (yield from changed(both, shutting, told_of_lids(space, fit, lines))), both
+
+
+def _shutting(space, fit, sides):
+    """What more (m,) shuts the eyes on these ``sides`` of a ``fit``."""
+    share = shut_share(space, fit)
+    return sum((1 - share[side]) * space.shut[side] for side in sides)
 
 
 def shut_by_sight(gaps: EyeGaps, lines: dict[str, LidLine], share: dict[str, float]) -> bool | None:
