@@ -26,6 +26,8 @@ LEAST = 4.0
 NARROW = 25.0  # mm between corners below which it is no mouth
 NOT_WIDE = 32.0  # the same of one that is not where it was expected: nostrils and the furrow under a lip lack data too
 NEAR = 6.0  # mm from where the gap ends to the scan
+#: mm to either side of the middle within which a mouth is seen whole, and of columns beside a cut that may be seen in part.
+HALF, CUT = 30.0, 4.0
 FARTHEST = 2 * DEEP  # mm looked behind the upper lip: the lower one of a mouth open in full lies beyond 25
 LOWER = 30.0  # mm: how much farther down is looked where a gap goes on below the chin that was expected
 #: Lips roll in: where a mouth is open their edges turn back into it, by .8 mm and more in 32 scans, on both lips; around holes
@@ -61,37 +63,43 @@ def mouth_outline(target: Surface, marks, forward, scale: float = 1.0) -> MouthO
     scale : mm on the scan per mm of the reference
     """
     places, depth = looked_at(target, marks, forward, scale)
-    depth = without_islands(depth)
+    depth, unseen = both_sides_of(without_islands(depth))
     start = middle_gap(depth)
     if start is None and goes_on_below(depth):
         lower, deeper = looked_at(target, marks, forward, scale, LOWER)
-        deeper = without_islands(deeper)
-        outline = _outline(target, lower, deeper, middle_gap(deeper), forward, scale)
+        deeper, unseen_too = both_sides_of(without_islands(deeper))
+        outline = _outline(target, lower, deeper, unseen_too, middle_gap(deeper), forward, scale)
     else:
-        outline = _outline(target, places, depth, start, forward, scale)
-    return outline or _outline(target, places, depth, large_gap(depth), forward, scale, expected=False)
+        outline = _outline(target, places, depth, unseen, start, forward, scale)
+    return outline or _outline(target, places, depth, unseen, large_gap(depth), forward, scale, expected=False)
 
 
-def _outline(target, places, depth, start, forward, scale, expected=True) -> MouthOutline | None:
-    """The `MouthOutline` around a gap, ``start`` as of `middle_gap`, where one was ``expected``; None: it is no mouth."""
+def _outline(target, places, depth, unseen, start, forward, scale, expected=True) -> MouthOutline | None:
+    """The `MouthOutline` around a gap, ``start`` as of `middle_gap`, where one was ``expected``; None: it is no mouth.
+
+    unseen (c,) bool : columns of ``depth`` of which the scan shows nothing
+    """
     if start is None:
         return None
     column, *lips = start
     upper, lower = places[column, lips] - scale * depth[column, lips, None] * forward
-    corners = []
+    corners, told = [], []
     for step in (1, -1):
         end, *lips = gap_end(depth, *start, step)
+        told.append(unseen[end])
         behind = depth[end, lips][np.isfinite(depth[end, lips])]
         corners.append(places[end, lips].mean(axis=0) - scale * (behind.mean() if len(behind) else 0.0) * forward)
     found = target.closest(np.array(corners), NEAR * scale)
+    corners = np.where(np.array(told)[:, None], corners, found.points)
     narrow = NARROW if expected else NOT_WIDE
-    if not found.found.all() or np.linalg.norm(np.subtract(*found.points)) < narrow * scale:
+    if not (found.found | told).all() or np.linalg.norm(np.subtract(*corners)) < narrow * scale:
         return None
     gaps = gaps_about(depth, column, TOP if expected else max(start[1] - TOP // 2, 0))
+    gaps = [gap for gap in gaps if not unseen[gap[0]]]
     no_hole = min(lip_rolls(depth, gaps)) > ROLL or scan_goes_on(target, places, scale * depth, forward, gaps)
     if not no_hole and not (expected and (start[2] - start[1]) * DOWN > APART):
         return None
-    return MouthOutline(dict(zip(CORNERS, found.points, strict=True)), upper, lower, bool(no_hole))
+    return MouthOutline(dict(zip(CORNERS, corners, strict=True)), upper, lower, bool(no_hole))
 
 
 def looked_at(target: Surface, marks, forward, scale: float, lower: float = 0.0):
@@ -103,6 +111,20 @@ def looked_at(target: Surface, marks, forward, scale: float, lower: float = 0.0)
     places = arch[:, None] + above[:, None] * up
     depth = bridged_depths(target, places.reshape(-1, 3), forward, scale * FARTHEST).reshape(places.shape[:2])
     return places, depth / scale
+
+
+def both_sides_of(depth):
+    """Depths (c, r) mm, see `looked_at`, in which a side of the mouth that a scan does not show is as the other one, and which
+    columns (c,) bool that are."""
+    seen = np.flatnonzero(np.isfinite(depth).any(axis=1))
+    middle, unseen = len(depth) // 2, np.zeros(len(depth), dtype=bool)
+    if len(seen) == 0:
+        return depth, unseen
+    right, left = middle - seen[0], seen[-1] - middle  # columns that are seen on either side
+    if -CUT < ASIDE * min(right, left) < HALF <= ASIDE * max(right, left):
+        aside = np.arange(len(depth)) - middle
+        unseen = (aside if left < right else -aside) > max(min(right, left) - CUT / ASIDE, 0)
+    return np.where(unseen[:, None], depth[::-1], depth), unseen
 
 
 def mouth_arch(marks, middle: str, forward, aside):
