@@ -67,7 +67,7 @@ def test_a_side_that_is_not_seen_is_as_the_other_from_a_little_before_the_cut(be
 @pytest.mark.parametrize("side", [1, -1])
 @pytest.mark.parametrize("beyond", [18.0, 6.0, 3.0])
 def test_half_a_mouth_has_the_outline_of_a_whole_one(open_mouth, side, beyond):
-    """Where the scan was cut counted as the other corner, up to 28 mm from where it is, or no mouth was seen."""
+    """Where the scan was cut counted as the other corner, up to 3 cm aside, or no mouth was seen."""
     target, marks = open_mouth
     whole = mouth_outline(target, marks, FORWARD)
     half = mouth_outline(one_side(target, side, beyond), marks, FORWARD)

@@ -78,6 +78,16 @@ def test_lids_of_a_wink_go_where_either_eye_shows_them(reference, seen_skin, mon
         assert (places[4.0][name] - places[0.0][name])[2] > 1.0
 
 
+def test_a_wink_is_fitted_where_the_open_eye_shows_no_margins(reference, seen_skin, monkeypatch):
+    """Joining what nothing tells of one eye with what a crease tells of the other ended in a traceback."""
+    target, _ = seen_skin(("l",))
+    monkeypatch.setattr(expression, "open_lids", lambda *_: {})
+    space = shape_space(reference)
+    fit, shown = finish(fit_expression(space, target, finish(fit_shape(space, target, HERE))))
+    assert shown.shut == ("l",) and shown.lids == {}
+    assert shut_share(space, fit)["l"] == pytest.approx(1.0, abs=0.25)
+
+
 def test_half_a_face_does_not_wink(reference, seen_skin, monkeypatch):
     """The eye that is not seen is as the other one."""
     target, _ = seen_skin(("r",))

@@ -62,23 +62,22 @@ def mouth_outline(target: Surface, marks, forward, scale: float = 1.0) -> MouthO
     marks : name -> (3,) mm, where about ``ls``, ``pg``, ``ch_l`` and ``ch_r`` lie; forward : (3,) unit vector, out of the face;
     scale : mm on the scan per mm of the reference
     """
-    places, depth = looked_at(target, marks, forward, scale)
-    depth, unseen = both_sides_of(without_islands(depth))
-    start = middle_gap(depth)
-    if start is None and goes_on_below(depth):
-        lower, deeper = looked_at(target, marks, forward, scale, LOWER)
-        deeper, unseen_too = both_sides_of(without_islands(deeper))
-        outline = _outline(target, lower, deeper, unseen_too, middle_gap(deeper), forward, scale)
+    seen = _seen_whole(target, marks, forward, scale)
+    start = middle_gap(seen[1])
+    if start is None and goes_on_below(seen[1]):
+        lower = _seen_whole(target, marks, forward, scale, LOWER)
+        outline = _outline(target, lower, middle_gap(lower[1]), forward, scale)
     else:
-        outline = _outline(target, places, depth, unseen, start, forward, scale)
-    return outline or _outline(target, places, depth, unseen, large_gap(depth), forward, scale, expected=False)
+        outline = _outline(target, seen, start, forward, scale)
+    return outline or _outline(target, seen, large_gap(seen[1]), forward, scale, expected=False)
 
 
-def _outline(target, places, depth, unseen, start, forward, scale, expected=True) -> MouthOutline | None:
+def _outline(target, seen, start, forward, scale, expected=True) -> MouthOutline | None:
     """The `MouthOutline` around a gap, ``start`` as of `middle_gap`, where one was ``expected``; None: it is no mouth.
 
-    unseen (c,) bool : columns of ``depth`` of which the scan shows nothing
+    seen : as of `_seen_whole`
     """
+    places, depth, unseen = seen
     if start is None:
         return None
     column, *lips = start
@@ -94,12 +93,19 @@ def _outline(target, places, depth, unseen, start, forward, scale, expected=True
     narrow = NARROW if expected else NOT_WIDE
     if not (found.found | told).all() or np.linalg.norm(np.subtract(*corners)) < narrow * scale:
         return None
-    gaps = gaps_about(depth, column, TOP if expected else max(start[1] - TOP // 2, 0))
-    gaps = [gap for gap in gaps if not unseen[gap[0]]]
+    top = TOP if expected else max(start[1] - TOP // 2, 0)
+    gaps = [gap for gap in gaps_about(depth, column, top) if not unseen[gap[0]]]
     no_hole = min(lip_rolls(depth, gaps)) > ROLL or scan_goes_on(target, places, scale * depth, forward, gaps)
     if not no_hole and not (expected and (start[2] - start[1]) * DOWN > APART):
         return None
     return MouthOutline(dict(zip(CORNERS, corners, strict=True)), upper, lower, bool(no_hole))
+
+
+def _seen_whole(target: Surface, marks, forward, scale: float, lower: float = 0.0):
+    """Places (c, r, 3) mm and depths (c, r) mm as of `looked_at`, without islands, and the columns (c,) bool of a side that is
+    not seen, which are as those of the other one."""
+    places, depth = looked_at(target, marks, forward, scale, lower)
+    return places, *both_sides_of(without_islands(depth))
 
 
 def looked_at(target: Surface, marks, forward, scale: float, lower: float = 0.0):

@@ -77,7 +77,7 @@ class Told:
     def of(cls, space: ShapeSpace, landmarks: dict[str, np.ndarray]) -> "Told":
         """What ``landmarks``, name -> (3,) mm on the scan, tell of the ``space``."""
         rows = [space.names.index(name) for name in landmarks]
-        return cls(space.corners[rows], space.weights[rows], np.array(list(landmarks.values())))
+        return cls(space.corners[rows], space.weights[rows], np.reshape(list(landmarks.values()), (-1, 3)))
 
     def and_of(self, other: "Told | None") -> "Told":
         """Both together."""
