@@ -22,7 +22,7 @@ from .infant import with_mouth_in_place
 from .looking import run
 from .mouth_beside_hair import with_mouth_again
 from .picked import picked
-from .placed_face import place_face, with_likelier_ears
+from .placed_face import at_rest, place_face, with_likelier_ears
 from .pose_search import LOOKING
 from .shape_space import shape_space
 from .sure import SURE
@@ -93,7 +93,8 @@ def _finding(mesh: Mesh, reference: Head | None, unit_scales, any_size: bool) ->
     mesh = Mesh.from_triangles(mesh.vertices, mesh.triangles[~jumps]) if jumps.any() else mesh
     yield Progress(0.05, LOOKING)
     placing = place_face(mesh, reference, space, unit_scales, any_size)
-    scale, fit, target, space = yield from portion(placing, 0.05, 0.75)
+    scale, fit, target, space = yield from portion(placing, 0.05, 0.73)
+    fit = yield from portion(at_rest(reference, space, target, fit), 0.73, 0.75)
     fit = yield from portion(with_likelier_ears(space, target, fit), 0.75, 0.77)
     beard, above = None, is_above_beard(space)
     space = shape_space(reference) if above else space

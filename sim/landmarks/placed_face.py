@@ -32,6 +32,9 @@ LESS_BAD = 0.85
 #: Likeness of an ear (`like_ears`) below which a fit is begun again, and what the ears of both sides must gain by it. A CT
 #: scan's left ear had .59 to .68 where it was laid a centimetre or more beside its place, .88 to .9 in it.
 LIKELY_EARS, LIKELIER = 0.75, 0.1
+#: mm by which a fit that is begun again from where it lies comes to lie elsewhere, root mean square over the face on a head of
+#: the reference's size, if it was not at rest; and how often it is begun again. Fits of whole heads moved by up to 1.2.
+AT_REST, AGAIN = 1.5, 2
 
 
 def place_face(mesh: Mesh, reference: Head, space: ShapeSpace, unit_scales, any_size: bool = False) -> Work:
@@ -85,6 +88,28 @@ def _is_face(look, result) -> bool:
     verdict, _, fit, _, space = result
     enough = verdict.likeness > PLAIN and (look.half or share_of(space, fit) > WHOLE)
     return not verdict.doubtful and (enough or look not in QUICK)
+
+
+def at_rest(reference: Head, space: ShapeSpace, target: Surface, fit: ShapeFit) -> Work:
+    """Work returning ``fit``, or, if that goes elsewhere when it is begun again from where it lies, what it comes to.
+
+    Where a scan ends at the chin a fit may get stuck with the lower lip on the upper one and the chin on the lower lip, each on
+    skin that faces its way.
+    """
+    for k in range(AGAIN):
+        again = yield from run(begun_again(space, target, fit, SIZE), k / AGAIN, (k + 1) / AGAIN, FITTING)
+        if again is None or judged(reference, space, again, THOROUGH.relief).doubtful:
+            break
+        if moved(space, fit, again) < AT_REST:
+            break
+        fit = again
+    return fit
+
+
+def moved(space: ShapeSpace, fit: ShapeFit, again: ShapeFit) -> float:
+    """How far the face of ``again`` lies from that of ``fit``, root mean square in mm on a head of the reference's size."""
+    far = np.linalg.norm(again.points - fit.points, axis=1)[space.face > 0.5]
+    return float(np.sqrt(np.mean(far**2))) / fit.pose.scale
 
 
 def with_likelier_ears(space: ShapeSpace, target: Surface, fit: ShapeFit) -> Work:
