@@ -74,6 +74,9 @@ def test_how_far_a_face_has_moved(space, laid):
     assert moved(space, fit, laid(space, space.points + [0, 3.0, 4.0])) == pytest.approx(5.0)
     beside = space.points + np.outer(space.face <= 0.5, [9.0, 0, 0])  # no part of the face
     assert moved(space, fit, laid(space, beside)) == 0.0
+    ways = np.linspace(0.0, 9.0, len(space.points))
+    far = moved(space, fit, laid(space, space.points + ways[:, None] * [0, 0.6, 0.8]))
+    assert far == pytest.approx(np.sqrt(np.mean(ways[space.face > 0.5] ** 2)))
     twice = replace(laid(space, 2 * space.points), pose=replace(fit.pose, scale=2.0))
     assert moved(space, twice, laid(space, 2 * space.points + [0, 3.0, 4.0])) == pytest.approx(2.5)
 
