@@ -16,6 +16,8 @@ from headshop.sim.landmarks import expression
 from headshop.sim.landmarks.expression import fit_expression, shut_share
 from headshop.sim.landmarks.eye_gaps import EyeGaps, crevices, eyes_shown, gaps_in_eyes
 from headshop.sim.landmarks.lid_creases import lid_lines, shut_by_creases, told_of_lids
+from headshop.sim.landmarks.lids_told import lids_told
+from headshop.sim.landmarks.open_lids import of_both_eyes
 from headshop.sim.landmarks.pose_search import Pose
 from headshop.sim.landmarks.shape_fit import CHANGE, Expression, Told, fit_shape
 from headshop.sim.landmarks.shape_space import shape_space
@@ -244,6 +246,30 @@ def test_of_half_a_face_the_eye_that_is_seen_tells(reference, seen_skin, sides):
     assert set(shown.shut) == set(sides)
     if not sides:
         assert {"ps_r", "pi_r"} <= set(shown.lids) and not any(name.endswith("_l") for name in shown.lids)
+
+
+@pytest.mark.parametrize("share", [0.5, 0.9])
+def test_an_eye_that_is_not_seen_is_as_wide_open_as_the_other(reference, seen_skin, monkeypatch, share):
+    whole, marks = seen_skin(())
+    target, space = right_half(whole), shape_space(reference)
+    way = marks["ps_r"] - marks["pi_r"]
+    narrow = {"ps_r": marks["pi_r"] + share * way, "pi_r": marks["pi_r"]}
+    monkeypatch.setattr(expression, "open_lids", lambda *_: narrow)
+    fit, shown = finish(fit_expression(space, target, finish(fit_shape(space, target, HERE))))
+    laid = space.landmarks(fit.points)
+    assert set(shown.lids) == set(narrow)
+    assert np.linalg.norm(laid["ps_l"] - laid["pi_l"]) == pytest.approx(share * np.linalg.norm(way), abs=1.2)
+    told = lids_told(space, fit, shown, target, {})
+    assert told["ps_l"] == pytest.approx(narrow["ps_r"] * [-1, 1, 1], abs=1.5) and told["ps_r"] is narrow["ps_r"]
+    assert np.linalg.norm(told["ps_l"] - told["pi_l"]) == pytest.approx(share * np.linalg.norm(way))
+
+
+def test_lids_of_both_eyes_and_of_none_are_left(reference):
+    marks = reference.landmark_positions()
+    both = {name: marks[name] + 1 for name in ("ps_l", "pi_l", "ps_r", "pi_r")}
+    assert of_both_eyes(both, marks) is both and of_both_eyes({}, marks) == {}
+    one = {"ps_l": marks["ps_l"] + [0, 0, 2.0]}
+    assert of_both_eyes(one, marks)["ps_r"] == pytest.approx(marks["ps_r"] + [0, 0, 2.0], abs=0.1)
 
 
 def test_along_an_eye_that_is_not_seen_no_crease_is_looked_for(reference, seen_skin, monkeypatch):

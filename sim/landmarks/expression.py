@@ -16,7 +16,7 @@ from .eyeballs_seen import eyeballs_seen
 from .lid_creases import lid_lines, shut_by_creases, told_of_lids
 from .lip_line import LipLine, lip_line
 from .mouth_outline import MouthOutline, mouth_outline
-from .open_lids import open_lids, told_of_open_lids
+from .open_lids import of_both_eyes, open_lids, told_of_open_lids
 from .picked import moved
 from .shape_fit import CHANGE, REST, Expression, ShapeFit, Told, fit_shape, part_of
 from .shape_space import ShapeSpace
@@ -101,7 +101,7 @@ def _fit_lids(space, target, fit, parted, told, scan):
     else:  # a slit along lids that meet may look like the outline of blank eyes
         seen = {} if gaps.show_shut else blank_eyes(*laid, sides)
     if seen:
-        lids = told_of_open_lids(space, fit, seen)
+        lids = told_of_open_lids(space, fit, of_both_eyes(seen, marks))
         return (yield from changed(Expression(parted), fit.coefficients, lids)), Expression(parted, lids=seen)
     share = shut_share(space, fit)
     seen_share = {side: share[side] for side in sides}

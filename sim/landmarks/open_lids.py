@@ -9,8 +9,10 @@ what a margin is. (Daugman 2004, *How iris recognition works*, finds lids in pic
 import numpy as np
 
 from ..adapt.closest import Surface
+from ..adapt.completion import mirror_plane
 from ..adapt.eye_frame import eye_frame
 from ..adapt.lid_line import BESIDE, DEEPEST, crease
+from ..anatomy.landmark_names import mirrored
 from .eye_gaps import SOCKET, over_the_eye
 from .eyeballs_seen import Eyeball
 from .picked import MOVED, moved
@@ -103,6 +105,18 @@ def best_pair(upper, lower) -> tuple[float, float] | None:
     liked = np.where(size < LEAST, -np.inf, seen - HEEDED * ((size - USUAL) / SPREAD) ** 2)
     above, below = np.unravel_index(liked.argmax(), liked.shape)
     return (float(ARCHES[above]), float(ARCHES[below])) if seen[above, below] > PLAIN else None
+
+
+def of_both_eyes(lids: dict[str, np.ndarray], marks: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """``lids``, name -> (3,) mm, and, where they are those of one eye only, their images on the other side of the face: an eye
+    that no scan shows is as wide open as the other one.
+
+    marks : name -> (3,) mm, about where all landmarks lie
+    """
+    if len({name[-1] for name in lids}) != 1:
+        return lids
+    middle, across = mirror_plane(marks)
+    return lids | {mirrored(name): place - 2 * (place - middle) @ across * across for name, place in lids.items()}
 
 
 def told_of_open_lids(space: ShapeSpace, fit: ShapeFit, seen: dict[str, np.ndarray]) -> Told:
