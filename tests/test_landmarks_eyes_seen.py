@@ -264,6 +264,14 @@ def test_an_eye_that_is_not_seen_is_as_wide_open_as_the_other(reference, seen_sk
     assert np.linalg.norm(told["ps_l"] - told["pi_l"]) == pytest.approx(share * np.linalg.norm(way))
 
 
+def test_an_eye_that_is_shut_is_not_as_the_one_that_is_open(reference, seen_skin):
+    target, marks = seen_skin(("l",))
+    space = shape_space(reference)
+    wink = Expression(shut=("l",), lids={name: marks[name] for name in ("ps_r", "pi_r")})
+    told = lids_told(space, finish(fit_shape(space, target, HERE)), wink, target, {})
+    assert told["ps_l"] == pytest.approx(told["pi_l"]) and told["ps_r"] is wink.lids["ps_r"]
+
+
 def test_lids_of_both_eyes_and_of_none_are_left(reference):
     marks = reference.landmark_positions()
     both = {name: marks[name] + 1 for name in ("ps_l", "pi_l", "ps_r", "pi_r")}
