@@ -181,6 +181,35 @@ def test_what_is_taken_for_a_face(reference, monkeypatch, misfit, likeness, spre
     assert judged(reference, SimpleNamespace(size=1.0), fit, 0.53).doubtful != face
 
 
+@pytest.mark.parametrize(
+    "misfit, likeness, spread, ears, face",
+    [
+        (3.28, 0.88, 1.4, (0.0, 0.89), True),  # half of somebody unlike most
+        (3.16, 0.85, 1.6, (0.9, 0.1), True),  # the same, noisy and cut off above the brows
+        (2.99, 0.93, 1.43, (0.82, 0.0), True),
+        (3.22, 0.91, 1.43, (0.3, 0.2), False),  # a chin on a mouth: no ear is in its place
+        (3.16, 0.85, 1.6, (0.78, 0.1), False),
+        (3.0, 0.78, 1.4, (0.9, 0.9), False),  # hardly like a face
+        (5.2, 0.95, 0.5, (0.9, 0.1), False),  # next to nothing of one
+        (3.2, 0.85, 2.0, (0.9, 0.1), False),  # nobody looks like that
+    ],
+)
+def test_an_ear_in_its_place_tells_half_a_face(reference, monkeypatch, misfit, likeness, spread, ears, face):
+    scan = Surface(np.eye(3), [[0, 1, 2]])
+
+    def like(space, fit, target):
+        assert target is scan
+        return dict(zip("lr", ears, strict=True))
+
+    monkeypatch.setattr(verdict, "misfit_of", lambda *_: misfit)
+    monkeypatch.setattr(verdict, "likeness_of", lambda *_: likeness)
+    monkeypatch.setattr(verdict, "share_of", lambda *_: 0.54)
+    monkeypatch.setattr(verdict, "like_ears", like)
+    fit = ShapeFit(None, np.full(10, spread), Pose(1.0, np.eye(3), np.zeros(3), 0.0), None, None, None)
+    assert judged(reference, SimpleNamespace(size=1.0), fit, 0.7, scan).doubtful != face
+    assert judged(reference, SimpleNamespace(size=1.0), fit, 0.7).doubtful
+
+
 def test_the_share_of_a_face_is_that_of_its_area_which_found_the_scan(reference):
     space = shape_space(reference)
     face, left = space.face > 0.5, space.points[:, 0] > 0

@@ -137,16 +137,17 @@ def test_half_a_face_is_looked_for_where_little_of_one_is_found(
 @pytest.mark.parametrize(("look", "wanted"), list(zip(LOOKS, (0.7, 0.7, 0.7, 0.7, 0.8), strict=True)))
 def test_further_places_must_show_as_much_of_a_face_as_in_a_thorough_look(reference, space, monkeypatch, look, wanted):
     """Whatever looks there are besides: those above a beard, of less of a face, ask for more."""
-    asked = []
+    asked, scan = [], object()
 
-    def doubted(reference, space, fit, relief):
+    def doubted(reference, space, fit, relief, target):
+        assert target is scan
         asked.append(relief)
         return Verdict(True, 9.0, 0.3)
 
     monkeypatch.setattr(looking, "fit_shape", lambda *_, **__: iter(()))
     monkeypatch.setattr(looking, "lies", lambda *_: None)
     monkeypatch.setattr(looking, "judged", doubted)
-    rival = 1.0, 1.0, SimpleNamespace(pose=None, coefficients=None), None
+    rival = 1.0, 1.0, SimpleNamespace(pose=None, coefficients=None), scan
     monkeypatch.setattr(looking, "run", lambda *_: (yield from _result(rival[2])))
     finish(looking._fits(look, reference, space, space, [rival, rival], 1))
     assert asked[:2] == [look.relief, wanted] and set(asked[2:]) == {wanted}

@@ -89,7 +89,7 @@ def _fits(look, reference, space, few, rivals, good) -> Work:
         except NoFaceError:
             continue
         relief = look.relief if k < good else thorough
-        results.append((judged(reference, space, fit, relief), scale, fit, target))
+        results.append((judged(reference, space, fit, relief, target), scale, fit, target))
     parts = iter(np.linspace(0.5, 1.0, look.again * TURNS + 1))
     done = next(parts)
     likely = sorted(results, key=lambda t: -t[0].likeness)[: look.again]
@@ -107,7 +107,7 @@ def _fits(look, reference, space, few, rivals, good) -> Work:
                 fit = yield from run(work, (3 * before + done) / 4, done, FITTING)
             except NoFaceError:
                 break
-            verdict = judged(reference, space, fit, thorough)
+            verdict = judged(reference, space, fit, thorough, target)
             results.append((verdict, scale, fit, target))
             if verdict.likeness < start.likeness + 0.01:
                 break

@@ -98,7 +98,7 @@ def at_rest(reference: Head, space: ShapeSpace, target: Surface, fit: ShapeFit) 
     """
     for k in range(AGAIN):
         again = yield from run(begun_again(space, target, fit, SIZE), k / AGAIN, (k + 1) / AGAIN, FITTING)
-        if again is None or judged(reference, space, again, THOROUGH.relief).doubtful:
+        if again is None or judged(reference, space, again, THOROUGH.relief, target).doubtful:
             break
         if moved(space, fit, again) < AT_REST:
             break
@@ -165,7 +165,7 @@ def _begun_from(starts, reference, scale, target, space) -> Work:
         fit = yield from run(work, 0.5, 1.0, FITTING)
     except NoFaceError:
         return None
-    return judged(reference, space, fit, THOROUGH.relief), scale, fit, target, space
+    return judged(reference, space, fit, THOROUGH.relief, target), scale, fit, target, space
 
 
 def _turned_over(space, fit):
