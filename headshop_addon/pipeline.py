@@ -16,7 +16,7 @@ from ..sim.mesh import Mesh
 from ..sim.progress import Progress, Work, portion
 from ..sim.scan.clean import cleaning
 from ..sim.scan.orientation import Orientation, detect, detecting
-from ..sim.scan.units import BY_FACE, plausible_units
+from ..sim.scan.units import BY_FACE, UNITS, plausible_units
 from . import bridge, heads, shape_keys
 from .detail_images import packing
 from .materials import dressing
@@ -96,7 +96,7 @@ def load_scan_alone(path, unit: str | None = None, up: str | None = None) -> Wor
         units = plausible_units(mesh, unit)
         work = find_landmarks(mesh, unit_scales=list(units.values()), any_size=unit is None)
         found = yield from portion(work, 0.05, 1.0)
-        name = next((name for name, scale in units.items() if scale == found.unit_scale), BY_FACE)
+        name = next((name for name, scale in (units | UNITS).items() if scale == found.unit_scale), BY_FACE)
         axes = detect(mesh, found.positions, unit=found.unit_scale, up=up, called=name, picked=False)
     return _upright(mesh, counts, axes, unit, seconds), found.placed(axes.turn(found.positions))
 

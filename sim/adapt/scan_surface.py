@@ -8,11 +8,13 @@ from ..errors import InputError
 from ..mesh import Mesh
 from ..scan.depth_jumps import depth_jumps
 from ..scan.flat_cuts import beyond, flat_cuts
+from ..scan.units import PLAUSIBLE
 from .closest import Surface
 from .thin_plate_spline import similarity
 
 NORMALS = 2.0  # mm over which the scan's normals are averaged
 MOST = 600_000  # triangles of a scan that are all looked at: edges of about 0.7 mm on a head
+FEWEST = 300  # triangles of a smaller one, of somebody from head to foot, that are a head
 ROOM = 0.35  # of the head's size that is kept around it
 #: What of a scan may be no skin: what a depth map has stretched over its jumps, where it was cut off, what the lips hold,
 #: hair, glasses, a beard.
@@ -44,11 +46,12 @@ def scan_surface(reference: Head, scan: Mesh, given: dict[str, np.ndarray], most
 def near_head(reference: Head, scan: Mesh, given: dict[str, np.ndarray], most: int = MOST) -> Surface:
     """The surface of ``scan`` (mm, any place) that is looked at.
 
-    given : name -> (3,) mm, landmarks that tell where the head is. A scan of more than ``most`` triangles is cut to the
-    head's neighbourhood, unless the landmarks lie elsewhere, and thinned (`Surface.coarser`).
+    given : name -> (3,) mm, landmarks that tell where the head is. A scan of more than ``most`` triangles, or of more than a
+    bust, is cut to the head's neighbourhood, unless the landmarks lie elsewhere, and thinned (`Surface.coarser`).
     """
     triangles = scan.triangles
-    if len(triangles) <= most:
+    large = len(triangles) > most
+    if not large and np.ptp(scan.vertices, axis=0).max() <= PLAUSIBLE[1]:
         return Surface(scan.vertices, triangles, NORMALS)
     rest = reference.landmark_positions()
     names = [name for name in given if name in rest]
@@ -57,7 +60,7 @@ def near_head(reference: Head, scan: Mesh, given: dict[str, np.ndarray], most: i
     margin = ROOM * np.ptp(head, axis=0).max()
     near = ((scan.vertices > head.min(axis=0) - margin) & (scan.vertices < head.max(axis=0) + margin)).all(axis=1)
     kept = near[triangles].all(axis=1)
-    some = triangles[kept] if kept.sum() > most / 10 else triangles
+    some = triangles[kept] if kept.sum() > (most / 10 if large else FEWEST) else triangles
     return Surface(scan.vertices, some, NORMALS).coarser(most)
 
 

@@ -14,6 +14,7 @@ from ..scan.face_match import face_template
 from .any_size import face_of_any_size, of_human_size, of_most
 from .beards import above_beard, template_above
 from .confidence import like_ears
+from .head_of_body import body_scales, head_of_body
 from .infant import infant_points, infant_space
 from .looking import FITTING, SIZE, TRIAL_MODES, lies, looked, run
 from .looks import LOOKS, PARTS, PLAIN, QUICK, SIZED, THOROUGH, WHOLE
@@ -56,6 +57,12 @@ def place_face(mesh: Mesh, reference: Head, space: ShapeSpace, unit_scales, any_
     def brought_to(scale):
         return place_face(mesh, reference, grown, [scale])
 
+    def of_body(scales):
+        return head_of_body(mesh, reference, grown, template, scales)
+
+    head = yield from portion(of_body(unit_scales), 0.0, 0.5)
+    if head is not None:
+        return (yield from portion(place_face(head[0], reference, grown, head[1:]), 0.5, 1.0))
     for look, (low, middle, high) in zip(LOOKS, PARTS, strict=True):
         if look.infant:
             space, template = infant_space(reference, grown), infant_points(reference, face_template(reference))
@@ -75,6 +82,9 @@ def place_face(mesh: Mesh, reference: Head, space: ShapeSpace, unit_scales, any_
                 own = yield from portion(of_human_size(reference, best, lies(of, fit).scale, or_infant), high, 1.0)
             return best[1:] if own else (yield from portion(brought_to(of_most(best)), high, 1.0))
         if any_size and look is LOOKS[0] and (best is None or best[0].doubtful):
+            head = yield from portion(of_body([x for x in body_scales(mesh) if x not in known]), middle, high)
+            if head is not None:
+                return (yield from portion(place_face(head[0], reference, grown, head[1:]), high, 1.0))
             work = face_of_any_size(mesh, reference, space, template, unit_scales, or_infant)
             scale, closer = yield from portion(work, high, SIZED)
             if scale is not None:

@@ -1,0 +1,147 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Scans of somebody from head to foot: the head is found in them, in any usual unit, and built."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from headshop.headshop_addon import pipeline
+from headshop.sim.adapt.scan_surface import near_head
+from headshop.sim.landmarks import head_of_body
+from headshop.sim.landmarks.find import FoundLandmarks, find_landmarks
+from headshop.sim.landmarks.head_of_body import APART, ENDS, HEAD, around, body_scales, ends
+from headshop.sim.landmarks.verdict import Verdict
+from headshop.sim.mesh import Mesh
+from headshop.sim.progress import Progress, finish
+from headshop.sim.scan.ply import write_ply
+from headshop.sim.scan.units import plausible_units
+
+#: Middle, from the chin, and half the size, mm, of what a body is made of.
+BODY = [((0, 20, -330), (190, 115, 260)), ((0, 20, -600), (170, 120, 170))] + [
+    ((side * x, y, z), size)
+    for side in (-1, 1)
+    for (x, y, z), size in (
+        ((95, 20, -880), (85, 90, 260)),
+        ((95, 30, -1250), (60, 62, 240)),
+        ((95, -20, -1490), (48, 130, 35)),
+        ((260, 30, -330), (52, 55, 190)),
+        ((300, 10, -620), (42, 45, 170)),
+        ((310, -5, -830), (25, 45, 95)),
+    )
+]
+
+
+def blob(middle, size, n=30):
+    """An ellipsoid, a little bumpy: vertices and triangles."""
+    polar, way = np.meshgrid(np.linspace(0, np.pi, n), np.linspace(0, 2 * np.pi, 2 * n, endpoint=False), indexing="ij")
+    points = (
+        np.stack([np.sin(polar) * np.cos(way), np.sin(polar) * np.sin(way), np.cos(polar)], axis=-1) * size + middle
+    )
+    points = (points + 2 * np.sin(points[..., [1, 2, 0]] / 19)).reshape(-1, 3)
+    row, column = np.arange(n - 1)[:, None] * 2 * n, np.arange(2 * n)[None]
+    a, b = row + column, row + (column + 1) % (2 * n)
+    sides = [np.stack([a, a + 2 * n, b], axis=-1), np.stack([b, a + 2 * n, b + 2 * n], axis=-1)]
+    return points, np.concatenate(sides).reshape(-1, 3)
+
+
+@pytest.fixture(scope="module")
+def body(reference):
+    """The reference's head on a body, 1.75 m high, from its scanned side: a mesh in mm."""
+    skin, marks = reference.skin, reference.landmark_positions()
+    outer = reference.groups["inner"] < 0.5
+    parts = [(skin.vertices, skin.triangles[outer[skin.triangles].all(axis=1)])]
+    parts += [blob(marks["gn"] + [0, 60, 0] + middle, size) for middle, size in BODY]
+    start = np.cumsum([0] + [len(points) for points, _ in parts])
+    triangles = np.concatenate([t + s for (_, t), s in zip(parts, start, strict=False)])
+    return Mesh.from_triangles(np.concatenate([points for points, _ in parts]), triangles)
+
+
+def turned(mesh, seed, scale):
+    """``mesh`` in any turn, in a unit of 1 / ``scale`` mm, and the turn (3, 3)."""
+    turn = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))[0]
+    turn *= np.sign(np.linalg.det(turn))
+    return mesh.moved(mesh.vertices @ turn.T * scale), turn
+
+
+@pytest.mark.parametrize("unit", [1000.0, 10.0])  # read as metres; not read as centimetres, in which busts are larger
+def test_the_head_of_a_body_is_found(reference, body, unit):
+    scan, turn = turned(body, int(unit), 1 / unit)
+    units = plausible_units(scan)
+    assert list(units) == (["m"] if unit == 1000 else ["mm"])
+    found = finish(find_landmarks(scan, reference, list(units.values()), any_size=True))
+    assert found.unit_scale == unit
+    marks = reference.landmark_positions()
+    for name in ("prn", "en_l", "en_r", "ch_l", "ch_r", "gn"):
+        assert np.linalg.norm(found.positions[name] - turn @ marks[name]) < 5.0, name
+
+
+def test_what_is_as_large_as_a_bust_is_looked_at_as_a_whole(reference, monkeypatch):
+    def never(*_):
+        raise AssertionError("parts of a head are looked at")
+
+    monkeypatch.setattr(head_of_body, "looked", never)
+    assert finish(head_of_body.head_of_body(reference.skin, reference, None, None, [1.0])) is None
+
+
+def test_an_end_without_a_plain_face_is_passed_over(reference, body, monkeypatch):
+    """The first end shows half a face, the second one a whole one."""
+    seen, fit, space = [], SimpleNamespace(points=np.zeros((1, 3))), SimpleNamespace(face=np.ones(1))
+
+    def looked(look, part, *_):
+        seen.append(part)
+        yield Progress(0.5, "")
+        return [(Verdict(False, 1.0, 0.9), 1.0, fit, None, space)]
+
+    monkeypatch.setattr(head_of_body, "looked", looked)
+    monkeypatch.setattr(head_of_body, "share_of", lambda *_: 0.5 if len(seen) == 1 else 0.9)
+    part, scale = finish(head_of_body.head_of_body(body, reference, None, None, [0.001, 1.0]))
+    assert len(seen) == 2 and scale == 1.0
+    assert np.linalg.norm(part.vertices, axis=1).max() < HEAD  # around that face
+
+
+def test_ends_are_what_sticks_out(body):
+    found = ends(body.vertices)
+    assert 4 <= len(found) <= ENDS
+    apart = np.linalg.norm(found[:, None] - found, axis=2)[~np.eye(len(found), dtype=bool)]
+    assert apart.min() >= APART
+    top, sole = body.vertices[:, 2].max(), body.vertices[:, 2].min()
+    assert {top, sole} == {v for v in (top, sole) if np.abs(found[:2, 2] - v).min() < 60}
+
+
+def test_what_is_bulky_is_no_body(body):
+    assert body_scales(body) == [1.0]
+    assert body_scales(body.moved(body.vertices / 10)) == [10.0]
+    assert body_scales(Mesh.from_triangles(*blob((0, 0, 0), (700, 700, 700)))) == []
+
+
+def test_a_part_is_all_within_reach(body):
+    part = around(body, body.vertices[0], 200.0)
+    assert 0 < len(part.faces) < len(body.faces)
+    assert np.linalg.norm(part.vertices - body.vertices[0], axis=1).max() < 200.0
+
+
+def test_a_skin_is_laid_on_the_head_of_a_body_alone(reference, body):
+    marks = reference.landmark_positions()
+    given = {name: marks[name] for name in ("prn", "en_l", "en_r", "ch_l", "ch_r", "gn")}
+    near = near_head(reference, body, given)
+    assert np.ptp(near.vertices, axis=0).max() < 900
+    assert len(near.triangles) < 0.8 * len(body.faces)
+    elsewhere = {name: place + [0, 3000, 0] for name, place in given.items()}
+    assert len(near_head(reference, body, elsewhere).triangles) > 0.95 * len(body.faces)  # all but those without area
+
+
+def test_the_unit_of_a_body_has_its_name(body, monkeypatch, tmp_path):
+    path = tmp_path / "body.ply"
+    scan = body.moved(body.vertices / 10)
+    write_ply(path, scan)
+
+    def found(mesh, **_):
+        yield Progress(0.5, "")
+        places = ((0, -100, 0), (15, -70, 40), (-15, -70, 40), (25, -75, -35), (-25, -75, -35))
+        marks = dict(zip(("prn", "en_l", "en_r", "ch_l", "ch_r"), np.array(places, dtype=float), strict=True))
+        return FoundLandmarks(marks, dict.fromkeys(marks, 1.0), (), (), 10.0)
+
+    monkeypatch.setattr(pipeline, "find_landmarks", found)
+    scan, _ = finish(pipeline.load_scan_alone(path))
+    assert scan.report["unit"] == "cm" and scan.report["unit_scale"] == 10.0
