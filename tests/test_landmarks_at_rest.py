@@ -95,8 +95,9 @@ def test_it_is_begun_again_while_it_moves_but_not_forever(reference, space, laid
         return offered.pop(0)
 
     monkeypatch.setattr(placed_face, "begun_again", begun_again)
-    monkeypatch.setattr(placed_face, "judged", lambda *_: SimpleNamespace(doubtful=False))
-    fit = finish(at_rest(reference, space, None, first))
+    # Whether it is a face is told by the scan it lies on, too.
+    monkeypatch.setattr(placed_face, "judged", lambda *args: SimpleNamespace(doubtful="scan" not in args))
+    fit = finish(at_rest(reference, space, "scan", first))
     assert fit is [first, *left][times]
 
 

@@ -107,6 +107,9 @@ def test_ends_are_what_sticks_out(body):
     assert apart.min() >= APART
     top, sole = body.vertices[:, 2].max(), body.vertices[:, 2].min()
     assert {top, sole} == {v for v in (top, sole) if np.abs(found[:2, 2] - v).min() < 60}
+    dense = np.concatenate([body.vertices, np.repeat(body.vertices[body.vertices[:, 2] > top - 250], 20, axis=0)])
+    assert len(ends(dense)) == len(found)  # where there are most points is as far away
+    assert np.abs(ends(dense)[:2, 2] - top).min() < 60
 
 
 def test_what_is_bulky_is_no_body(body):

@@ -143,7 +143,7 @@ def test_a_face_is_laid_anew_as_an_infants_only_where_that_is_plainly_less_bad(
     points = infants.size * infants.points
     target = Surface(points, infants.triangles)
     fit = _laid(space, target, np.eye(3), infants.landmarks(points)["prn"])
-    monkeypatch.setattr(placed_face, "judged", lambda *_: Verdict(doubtful, bad, 0.8))
+    monkeypatch.setattr(placed_face, "judged", lambda *args: Verdict(doubtful or args[-1] is not target, bad, 0.8))
     best = finish(placed_face._or_infant(reference, (Verdict(False, 10.0, 0.7), 1.0, fit, target, space), 0.85))
     assert best[4].of_infants == taken
 
