@@ -85,19 +85,24 @@ def test_what_is_as_large_as_a_bust_is_looked_at_as_a_whole(reference, monkeypat
 
 
 def test_an_end_without_a_plain_face_is_passed_over(reference, body, monkeypatch):
-    """The first end shows half a face, the second one a whole one."""
-    seen, fit, space = [], SimpleNamespace(points=np.zeros((1, 3))), SimpleNamespace(face=np.ones(1))
+    """The first end shows half a face, the second one whole ones, of which the better is taken."""
+    seen, space = [], SimpleNamespace(face=np.ones(1))
+    fit, worse = (SimpleNamespace(points=np.full((1, 3), place)) for place in (0.0, -200.0))
 
     def looked(look, part, *_):
         seen.append(part)
         yield Progress(0.5, "")
-        return [(Verdict(False, 1.0, 0.9), 1.0, fit, None, space)]
+        return [
+            (Verdict(False, bad, 0.9), 1.0, of, None, space) for bad, of in ((2.0, worse), (1.0, fit), (3.0, worse))
+        ]
 
     monkeypatch.setattr(head_of_body, "looked", looked)
     monkeypatch.setattr(head_of_body, "share_of", lambda *_: 0.5 if len(seen) == 1 else 0.9)
     part, scale = finish(head_of_body.head_of_body(body, reference, None, None, [0.001, 1.0]))
     assert len(seen) == 2 and scale == 1.0
-    assert np.linalg.norm(part.vertices, axis=1).max() < HEAD  # around that face
+    far = np.linalg.norm(part.vertices, axis=1)
+    head = np.linalg.norm(reference.skin.vertices[reference.groups["inner"] < 0.5], axis=1)
+    assert far.max() < HEAD and (far > 150).sum() > 0.9 * ((head > 150) & (head < HEAD)).sum()  # all of the head there
 
 
 def test_ends_are_what_sticks_out(body):
@@ -132,6 +137,10 @@ def test_a_skin_is_laid_on_the_head_of_a_body_alone(reference, body):
     assert len(near.triangles) < 0.8 * len(body.faces)
     elsewhere = {name: place + [0, 3000, 0] for name, place in given.items()}
     assert len(near_head(reference, body, elsewhere).triangles) > 0.95 * len(body.faces)  # all but those without area
+    speck, _ = blob(elsewhere["prn"], (5.0, 5.0, 5.0), 4)
+    more = np.concatenate([body.triangles, len(body.vertices) + np.arange(9).reshape(3, 3)])
+    more = Mesh.from_triangles(np.concatenate([body.vertices, speck]), more)
+    assert len(near_head(reference, more, elsewhere).triangles) > 0.95 * len(body.faces)  # three triangles are no head
 
 
 def test_the_unit_of_a_body_has_its_name(body, monkeypatch, tmp_path):
