@@ -148,15 +148,20 @@ def test_a_dense_surface_thinned_lies_where_it_lay():
 
 def test_only_the_head_of_a_large_scan_is_looked_at(reference):
     head = reference.skin
-    wall, triangles = sheet(1500, 60, -400.0)
-    scan = Mesh.from_triangles(
-        np.concatenate([head.vertices, wall - [750, 750, 0]]),
-        np.concatenate([head.triangles, triangles + len(head.vertices)]),
-    )
     marks = reference.landmark_positions()
     given = {name: marks[name] for name in ("ex_l", "ex_r", "prn", "gn", "t_l")}
-    whole = scan_surface(reference, scan, given)
-    assert len(whole.triangles) == len(scan.triangles)
+
+    def before_wall(size):
+        wall, triangles = sheet(size, 60, -400.0)
+        return Mesh.from_triangles(
+            np.concatenate([head.vertices, wall - [size / 2, size / 2, 0]]),
+            np.concatenate([head.triangles, triangles + len(head.vertices)]),
+        )
+
+    scan = before_wall(800)  # no larger than a bust
+    assert len(scan_surface(reference, scan, given).triangles) == len(scan.triangles)
+    scan = before_wall(1500)
+    assert len(scan_surface(reference, scan, given).triangles) == len(head.triangles)
     some = scan_surface(reference, scan, given, most=len(head.triangles))
     assert some.vertices[:, 2].min() > -300 and len(some.triangles) == len(head.triangles)
     thin = scan_surface(reference, scan, given, most=2000)
