@@ -11,7 +11,7 @@ from ..anatomy.head import Head
 from ..mesh import Mesh, vertex_areas
 from ..progress import Progress, Work, portion
 from ..scan.face_match import FINE, surface_samples, thinned
-from ..scan.units import BODY, PLAUSIBLE, UNITS
+from ..scan.units import UNITS, is_body
 from .looking import looked
 from .looks import ANY_SIZE, PLAIN, WHOLE
 from .pose_search import LOOKING
@@ -23,13 +23,9 @@ APART = 350.0  # mm between two ends
 ROUND = 320.0  # mm around an end, the top of a head or a hand, that are looked at: a head is 250 high
 HEAD = 350.0  # mm around the middle of a face that are kept: all of the head, and shoulders
 FEW = 300  # triangles: an end with fewer is a speck
-#: Area of the surface against the square of its width, above which nothing is a body: people of 1.75 m have 1.9 m² of skin, .6.
+#: Area of the surface against the square of its width, above which nothing is a body: people of 1.75 m and 75 kg have 1.9 m² of
+#: skin (Du Bois and Du Bois 1916), .6.
 THIN = 0.8
-
-
-def is_body(extent: float) -> bool:
-    """Whether a scan with this largest ``extent`` in mm is of more than a bust."""
-    return PLAUSIBLE[1] < extent <= BODY
 
 
 def body_scales(mesh: Mesh) -> list[float]:

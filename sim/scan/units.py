@@ -49,6 +49,11 @@ def is_human(size: float, smallest: float = GROWN) -> bool:
     return smallest < size < LARGEST
 
 
+def is_body(extent: float) -> bool:
+    """Whether a scan with this largest ``extent`` in mm is of more than a bust, and of no more than somebody."""
+    return PLAUSIBLE[1] < extent <= BODY
+
+
 def plausible_units(mesh: Mesh, unit: str | float | None = None) -> dict[str, float]:
     """Unit -> mm, of those in which the scan is as large as a head, perhaps none; only ``unit`` where it is given.
 
@@ -77,7 +82,7 @@ def units_of(points: np.ndarray, unit, called: str = CUSTOM) -> list[tuple[str, 
         return [(name, scale)]
     least, most = PLAUSIBLE
     units = [(name, scale) for name, scale in UNITS.items() if least <= extent * scale <= most]
-    return units or [(name, scale) for name, scale in UNITS.items() if most < extent * scale <= BODY]
+    return units or [(name, scale) for name, scale in UNITS.items() if is_body(extent * scale)]
 
 
 def told_unit(unit: str | float, called: str = CUSTOM) -> tuple[str, float]:
