@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Scans of somebody from head to foot: the head is found in them, in any usual unit, and built."""
+"""Scans of somebody from head to foot, or among walls: the head is found in them, in any unit, and built."""
 
 from types import SimpleNamespace
 
@@ -8,9 +8,19 @@ import pytest
 
 from headshop.headshop_addon import pipeline
 from headshop.sim.adapt.scan_surface import near_head
-from headshop.sim.landmarks import head_of_body
+from headshop.sim.landmarks import head_of_body, placed_face
 from headshop.sim.landmarks.find import FoundLandmarks, find_landmarks
-from headshop.sim.landmarks.head_of_body import APART, ENDS, HEAD, around, body_scales, ends
+from headshop.sim.landmarks.head_of_body import (
+    APART,
+    ENDS,
+    FEW,
+    HEAD,
+    around,
+    body_scales,
+    ends,
+    other_scales,
+    parts_of,
+)
 from headshop.sim.landmarks.verdict import Verdict
 from headshop.sim.mesh import Mesh
 from headshop.sim.progress import Progress, finish
@@ -43,6 +53,20 @@ def blob(middle, size, n=30):
     a, b = row + column, row + (column + 1) % (2 * n)
     sides = [np.stack([a, a + 2 * n, b], axis=-1), np.stack([b, a + 2 * n, b + 2 * n], axis=-1)]
     return points, np.concatenate(sides).reshape(-1, 3)
+
+
+def wall(corner, along, up, step=25.0, rough=4.0):
+    """A rough wall from its ``corner``: vertices and triangles."""
+    along, up = np.array(along, float), np.array(up, float)
+    m, n = (int(np.linalg.norm(side) / step) for side in (along, up))
+    a, b = np.meshgrid(np.linspace(0, 1, m), np.linspace(0, 1, n), indexing="ij")
+    out = np.cross(along, up) / np.linalg.norm(np.cross(along, up))
+    points = corner + a[..., None] * along + b[..., None] * up
+    points = points + np.random.default_rng(m).normal(0, rough, (m, n, 1)) * out
+    index = np.arange(m * n).reshape(m, n)
+    one, two, three, four = index[:-1, :-1], index[1:, :-1], index[:-1, 1:], index[1:, 1:]
+    sides = [np.stack([one, two, three], axis=-1), np.stack([two, four, three], axis=-1)]
+    return points.reshape(-1, 3), np.concatenate(sides).reshape(-1, 3)
 
 
 @pytest.fixture(scope="module")
@@ -98,8 +122,8 @@ def test_an_end_without_a_plain_face_is_passed_over(reference, body, monkeypatch
 
     monkeypatch.setattr(head_of_body, "looked", looked)
     monkeypatch.setattr(head_of_body, "share_of", lambda *_: 0.5 if len(seen) == 1 else 0.9)
-    part, scale = finish(head_of_body.head_of_body(body, reference, None, None, [0.001, 1.0]))
-    assert len(seen) == 2 and scale == 1.0
+    best, part = finish(head_of_body.head_of_body(body, reference, None, None, [0.001, 1.0]))
+    assert len(seen) == 2 and best[2] is fit
     far = np.linalg.norm(part.vertices, axis=1)
     head = np.linalg.norm(reference.skin.vertices[reference.groups["inner"] < 0.5], axis=1)
     assert far.max() < HEAD and (far > 150).sum() > 0.9 * ((head > 150) & (head < HEAD)).sum()  # all of the head there
@@ -121,6 +145,76 @@ def test_what_is_bulky_is_no_body(body):
     assert body_scales(body) == [1.0]
     assert body_scales(body.moved(body.vertices / 10)) == [10.0]
     assert body_scales(Mesh.from_triangles(*blob((0, 0, 0), (700, 700, 700)))) == []
+
+
+@pytest.fixture(scope="module")
+def in_a_room(body):
+    """The body in the corner of a room, a board beside it, and how many triangles it has itself."""
+    low = body.vertices.min(axis=0) - [900, 600, 0]
+    parts = [
+        (body.vertices, body.triangles),
+        wall(low, (2600, 0, 0), (0, 1600, 0)),
+        wall(low, (0, 1600, 0), (0, 0, 2300)),
+    ]
+    parts += [
+        wall(low + [2300, 300, 900], (0, 600, 0), (200, 0, 0), 8),
+        blob(low + [300, 300, 400], (130.0, 150.0, 140.0)),
+    ]
+    start = np.cumsum([0] + [len(points) for points, _ in parts])
+    triangles = np.concatenate([t + s for (_, t), s in zip(parts, start, strict=False)])
+    return Mesh.from_triangles(np.concatenate([points for points, _ in parts]), triangles), len(body.triangles)
+
+
+def test_the_head_of_somebody_in_a_room_is_found(reference, in_a_room):
+    scan, turn = turned(in_a_room[0], 5, 1 / 1000)
+    found = finish(find_landmarks(scan, reference, [1000.0], any_size=True))
+    assert found.unit_scale == 1000.0
+    marks = reference.landmark_positions()
+    for name in ("prn", "en_l", "en_r", "ch_l", "ch_r", "gn"):
+        assert np.linalg.norm(found.positions[name] - turn @ marks[name]) < 5.0, name
+
+
+def test_the_head_of_a_body_in_no_unit_is_as_large_as_most(reference, body, monkeypatch):
+    """It is looked at as a body that is 1.75 m high, and brought to the size of most from there."""
+    scan = body.moved(body.vertices * 0.0021)
+    tall, short = (stature / np.ptp(scan.vertices[:, 2]) for stature in (1750, 1100))
+    assert other_scales(scan, [1000.0]) == pytest.approx([tall, short])
+    assert other_scales(scan, [1000.0, tall / 1.1]) == pytest.approx([short])  # that is as good
+    monkeypatch.setattr(placed_face, "resized", lambda _, result, factor: (*result[:1], factor, *result[2:]))
+    monkeypatch.setattr(placed_face, "of_most", lambda result: 2.0 * result[1])
+    monkeypatch.setattr(placed_face, "facing_out", lambda *_: None)
+    monkeypatch.setattr(placed_face, "lies", lambda *_: None)
+    for other, taken in ((Verdict(False, 0.5, 0.9), "again"), (Verdict(False, 3.0, 0.9), "seen"), (None, "seen")):
+
+        def begun(poses, _, scale, *more, other=other):
+            yield Progress(0.5, "")
+            return other and (other, scale, "again", None, None)
+
+        monkeypatch.setattr(placed_face, "_begun_from", begun)
+        for scale, own in ((470.0, 2.0), (1000.0, 1000.0)):
+            seen = (Verdict(False, 1.0, 0.9), scale, "seen", None, None)
+            assert finish(placed_face._placed_on((seen, reference.skin), reference))[:2] == (own, taken)
+
+
+def test_a_room_is_looked_at_piece_by_piece(body, in_a_room):
+    """What is as large as a head or a bust is looked at whole, of what is larger its ends; walls are not."""
+    scan, own = in_a_room
+    assert 1.0 in other_scales(scan, [])
+    assert 1.0 not in other_scales(scan, [1.0])
+    parts = parts_of(scan, 1.0)
+    assert all(len(part.faces) >= FEW for _, part in parts)
+    assert (
+        sum(len(part.faces) == len(piece.faces) for piece, part in parts) >= 3
+    )  # blobs, and the head, all in one piece
+    assert all(np.ptp(part.vertices, axis=0).max() < 900 for _, part in parts)
+    assert max(len(piece.faces) for piece, _ in parts) < own
+
+
+def test_a_body_without_walls_is_looked_at_by_its_ends(body):
+    parts = parts_of(body, 1.0)
+    assert all(piece is body for piece, _ in parts)
+    assert len(parts) == len(ends(head_of_body.surface_samples(body)))
+    assert other_scales(body, [1.0]) == pytest.approx([1100 / np.ptp(body.vertices[:, 2])])  # it may end at the hips
 
 
 def test_a_part_is_all_within_reach(body):

@@ -54,13 +54,13 @@ def of_human_size(reference: Head, result, size: float, or_infant) -> Work:
     if space.of_infants or is_human(size) or not is_human(size, SMALLEST):
         return is_human(size, SMALLEST)
     own = lies(space, fit).scale
-    grown = _resized(reference, result, space.size / own)
-    baby = _resized(reference, result, infant_space(reference, space).size / own)
+    grown = resized(reference, result, space.size / own)
+    baby = resized(reference, result, infant_space(reference, space).size / own)
     rival = (grown[0], *baby[1:])
     return (yield from or_infant(rival, 1.0)) is not rival
 
 
-def _resized(reference, result, factor):
+def resized(reference: Head, result, factor: float):
     """``result``, one of those of `looked`, as it were if the scan were ``factor`` times as large."""
     _, scale, fit, target, space = result
     pose = replace(fit.pose, scale=factor * fit.pose.scale, shift=factor * fit.pose.shift)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The head in a scan of somebody from head to foot: a face is looked for at the ends of the body, one after the other.
+"""The head in a scan of more than a bust: of somebody from head to foot, or among walls and furniture.
 
-Laid on all of a body at once, a face finds hips and knees as good as itself, and what is looked at of each is coarser than
-its features.
+Laid on all of that at once, a face finds hips, knees and cushions as good as itself, and what is looked at of each is coarser
+than its features. So it is looked for in one part after the other: what sticks out of a body, and what is left without walls.
 """
 
 import numpy as np
@@ -11,7 +11,8 @@ from ..anatomy.head import Head
 from ..mesh import Mesh, vertex_areas
 from ..progress import Progress, Work, portion
 from ..scan.face_match import FINE, surface_samples, thinned
-from ..scan.units import UNITS, is_body
+from ..scan.scenery import in_walls, only, pieces, without
+from ..scan.units import BODY, PLAUSIBLE, UNITS, is_body, is_scene
 from .looking import looked
 from .looks import ANY_SIZE, PLAIN, WHOLE
 from .pose_search import LOOKING
@@ -19,6 +20,7 @@ from .shape_space import ShapeSpace
 from .verdict import ODD, share_of
 
 ENDS = 8  # of a body that are looked at: head, hands and feet, and what else sticks out
+PARTS = 16  # of a scan that are looked at
 APART = 350.0  # mm between two ends
 ROUND = 320.0  # mm around an end, the top of a head or a hand, that are looked at: a head is 250 high
 HEAD = 350.0  # mm around the middle of a face that are kept: all of the head, and shoulders
@@ -26,40 +28,66 @@ FEW = 300  # triangles: an end with fewer is a speck
 #: Area of the surface against the square of its width, above which nothing is a body: people of 1.75 m and 75 kg have 1.9 m² of
 #: skin (Du Bois and Du Bois 1916), .6.
 THIN = 0.8
+#: mm across, as which bodies in no usual unit are looked at: from head to foot, and from the head to the hips.
+STATURES = (1750.0, 1100.0)
+SIMILAR = 1.2  # between two scales that are as good as one: a face is found if it is .72 to 1.22 of the reference
 
 
 def body_scales(mesh: Mesh) -> list[float]:
     """mm per unit, the usual ones in which the mesh may be somebody from head to foot; none if it is too bulky for that."""
-    width = 2 * _away(thinned(surface_samples(mesh), FINE)).max()
-    if vertex_areas(mesh.vertices, mesh.triangles).sum() > THIN * width**2:
-        return []
-    return [scale for scale in UNITS.values() if is_body(_extent(mesh) * scale)]
+    return [scale for scale in UNITS.values() if is_body(_extent(mesh) * scale)] if _is_thin(mesh) else []
+
+
+def other_scales(mesh: Mesh, known) -> list[float]:
+    """mm per unit, beside those that are ``known``, of what is less usual than `body_scales`: the usual ones in which it is a
+    room or has walls, and those that make a body of no usual unit as large as people are."""
+    scales = [scale for scale in UNITS.values() if is_scene(_extent(mesh) * scale)]
+    scales = [scale for scale in scales if in_walls(mesh, scale).any()]
+    if _is_thin(mesh):
+        scales += [stature / _extent(mesh) for stature in STATURES]
+    return [scale for scale in scales if all(not 1 / SIMILAR < scale / other < SIMILAR for other in known)]
 
 
 def head_of_body(mesh: Mesh, reference: Head, space: ShapeSpace, template, scales) -> Work:
-    """Work returning the part of ``mesh`` around the face at the first end of a body that shows one plainly, and mm per unit;
-    None: none does.
+    """Work returning the first part of ``mesh`` that shows a face plainly: what `looked` says of that, and all around the face
+    that the part was cut from; None: none does.
 
-    template (k, 3) mm : as of `face_template`; scales : mm per unit, of which those are tried that make it a body
+    template (k, 3) mm : as of `face_template`; scales : mm per unit, of which those are tried that make it more than a bust
     """
-    scales = [scale for scale in scales if is_body(_extent(mesh) * scale)]
+    scales = [scale for scale in scales if is_scene(_extent(mesh) * scale)]
     for k, scale in enumerate(scales):
-        places = ends(surface_samples(mesh) * scale)
-        for j, place in enumerate(places):
-            low, high = ((k + (j + more) / len(places)) / len(scales) for more in (0, 1))
-            yield Progress(low, LOOKING)
-            part = around(mesh, place / scale, ROUND / scale)
-            if len(part.faces) < FEW:
-                continue
+        yield Progress(k / len(scales), LOOKING)
+        parts = parts_of(mesh, scale)
+        for j, (piece, part) in enumerate(parts):
+            low, high = ((k + (j + more) / len(parts)) / len(scales) for more in (0, 1))
             seen = yield from portion(looked(ANY_SIZE, part, reference, space, template, [scale], 0.7), low, high)
-            seen = [result for result in seen if _is_plain(result)]
+            seen = [result for result in seen if is_plain(result)]
             if seen:
-                _, _, fit, _, of = min(seen, key=lambda t: t[0])
-                return around(mesh, fit.points[of.face > 0.5].mean(axis=0) / scale, HEAD / scale), scale
+                best = min(seen, key=lambda t: t[0])
+                _, _, fit, _, of = best
+                return best, around(piece, fit.points[of.face > 0.5].mean(axis=0) / scale, HEAD / scale)
     return None
 
 
-def _is_plain(result) -> bool:
+def parts_of(mesh: Mesh, scale: float) -> list[tuple[Mesh, Mesh]]:
+    """Parts of ``mesh``, with so many mm per unit, in which a head may be, likeliest first, after what each is a part of.
+
+    Without walls these are the ends of a body; else the pieces that are left without them: as they are, where they are of the
+    size of a head or a bust, and one after the other the ends of those that are larger.
+    """
+    walls, ranked = in_walls(mesh, scale), []
+    for k, piece in enumerate(pieces(without(mesh, walls), FEW) if walls.any() else [mesh]):
+        across = _extent(piece) * scale
+        if is_body(across):
+            places = ends(surface_samples(piece) * scale) / scale
+            ranked += [(j, k, piece, around(piece, place, ROUND / scale)) for j, place in enumerate(places)]
+        elif PLAUSIBLE[0] <= across <= BODY:
+            ranked.append((0, k, piece, piece))
+    ranked.sort(key=lambda t: t[:2])
+    return [(piece, part) for *_, piece, part in ranked if len(part.faces) >= FEW][:PARTS]
+
+
+def is_plain(result) -> bool:
     """Whether ``result``, one of those of `looked`, is plainly a whole face."""
     verdict, _, fit, _, space = result
     whole = share_of(space, fit) > WHOLE
@@ -83,8 +111,13 @@ def around(mesh: Mesh, place, reach: float) -> Mesh:
     """The triangles of ``mesh`` of which all corners are within ``reach`` of ``place`` (3,)."""
     near = ((mesh.vertices - place) ** 2).sum(axis=1) < reach**2
     triangles = mesh.triangles[near[mesh.triangles].all(axis=1)]
-    used, index = np.unique(triangles, return_inverse=True)
-    return Mesh.from_triangles(mesh.vertices[used], index.reshape(-1, 3))
+    return only(mesh, triangles)
+
+
+def _is_thin(mesh: Mesh) -> bool:
+    """Whether the mesh is not too bulky for somebody's body."""
+    width = 2 * _away(thinned(surface_samples(mesh), FINE)).max()
+    return vertex_areas(mesh.vertices, mesh.triangles).sum() <= THIN * width**2
 
 
 def _extent(mesh: Mesh) -> float:

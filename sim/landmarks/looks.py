@@ -60,8 +60,8 @@ LOOKS = (
 ANY_SIZE = replace(LOOKS[0], tried=4, most=2, further=3, again=1)
 #: Shares of the work at which trials of each look begin, and its fits begin and end. Between the first and the second a face
 #: may be looked for in any size.
-PARTS = ((0.0, 0.4, 0.55), (0.7, 0.73, 0.75), (0.75, 0.82, 0.86), (0.86, 0.91, 0.94), (0.94, 0.96, 0.98))
-SIZED = 0.7  # share at which that is done
+PARTS = ((0.0, 0.4, 0.55), (0.72, 0.73, 0.75), (0.75, 0.82, 0.86), (0.86, 0.91, 0.94), (0.94, 0.96, 0.98))
+SIZED, ODDLY_SIZED = 0.7, 0.72  # shares at which that is done, and the same for a body or a room
 MIDDLE = 6.0  # mm: so far half a face goes beyond the middle
 WHOLE = 0.65  # share of a face that finds the scan, below which half of one is looked for as well
 PLAIN = 0.66  # relief from which on a quick look is enough: faces have as much

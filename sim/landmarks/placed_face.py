@@ -6,18 +6,20 @@ from dataclasses import replace
 import numpy as np
 
 from ..adapt.closest import Surface
+from ..adapt.scan_surface import NORMALS
 from ..anatomy.head import Head
 from ..errors import InputError
 from ..mesh import Mesh
 from ..progress import Work, portion
 from ..scan.face_match import face_template
-from .any_size import face_of_any_size, of_human_size, of_most
+from ..scan.units import UNITS
+from .any_size import face_of_any_size, of_human_size, of_most, resized
 from .beards import above_beard, template_above
 from .confidence import like_ears
-from .head_of_body import body_scales, head_of_body
+from .head_of_body import body_scales, head_of_body, other_scales
 from .infant import infant_points, infant_space
-from .looking import FITTING, SIZE, TRIAL_MODES, lies, looked, run
-from .looks import LOOKS, PARTS, PLAIN, QUICK, SIZED, THOROUGH, WHOLE
+from .looking import FITTING, SIZE, TRIAL_MODES, facing_out, lies, looked, run
+from .looks import LOOKS, ODDLY_SIZED, PARTS, PLAIN, QUICK, SIZED, THOROUGH, WHOLE
 from .shape_fit import TRIAL, NoFaceError, ShapeFit, fit_shape
 from .shape_space import ShapeSpace
 from .verdict import ODD, judged, likeness_of, misfit_of, share_of, weighed
@@ -62,7 +64,7 @@ def place_face(mesh: Mesh, reference: Head, space: ShapeSpace, unit_scales, any_
 
     head = yield from portion(of_body(unit_scales), 0.0, 0.5)
     if head is not None:
-        return (yield from portion(place_face(head[0], reference, grown, head[1:]), 0.5, 1.0))
+        return (yield from portion(_placed_on(head, reference), 0.5, 1.0))
     for look, (low, middle, high) in zip(LOOKS, PARTS, strict=True):
         if look.infant:
             space, template = infant_space(reference, grown), infant_points(reference, face_template(reference))
@@ -84,13 +86,32 @@ def place_face(mesh: Mesh, reference: Head, space: ShapeSpace, unit_scales, any_
         if any_size and look is LOOKS[0] and (best is None or best[0].doubtful):
             head = yield from portion(of_body([x for x in body_scales(mesh) if x not in known]), middle, high)
             if head is not None:
-                return (yield from portion(place_face(head[0], reference, grown, head[1:]), high, 1.0))
+                return (yield from portion(_placed_on(head, reference), high, 1.0))
             work = face_of_any_size(mesh, reference, space, template, unit_scales, or_infant)
             scale, closer = yield from portion(work, high, SIZED)
             if scale is not None:
                 return (yield from portion(brought_to(scale), SIZED, 1.0))
+            head = yield from portion(of_body(other_scales(mesh, [*known, *body_scales(mesh)])), SIZED, ODDLY_SIZED)
+            if head is not None:
+                return (yield from portion(_placed_on(head, reference), ODDLY_SIZED, 1.0))
             unit_scales = unit_scales or closer
     raise InputError(NO_FACE.format("" if any_size else " and that its unit (--units) is right"))
+
+
+def _placed_on(head, reference) -> Work:
+    """Work returning what `place_face` does for a ``head`` out of a larger scan, what `head_of_body` returns: the face as it
+    was seen, or begun from there on all around it, whichever fits better.
+
+    What is around it may be cut from its part, as an ear, or be shoulders and chairs, on which neck and jaw lie worse. In no
+    usual unit the head is brought to the size of most.
+    """
+    seen, around = head
+    _, scale, fit, _, space = seen
+    pose = lies(space, fit)
+    target = facing_out(space, Surface(around.vertices * scale, around.triangles, smooth=NORMALS).coarser(), pose)
+    rival = yield from _begun_from([pose], reference, scale, target, space)
+    best = min((seen, rival), key=lambda t: t[0]) if rival else seen
+    return (best if scale in UNITS.values() else resized(reference, best, of_most(best) / scale))[1:]
 
 
 def _is_face(look, result) -> bool:

@@ -18,6 +18,7 @@ UNITS = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
 #: Largest extent of a scan of a face patch (the smallest) and of a bust (the largest), mm.
 PLAUSIBLE = (90.0, 900.0)
 BODY = 2600.0  # mm, the same of somebody from head to foot: taken for that only if no unit makes a head of it
+SCENE = 15_000.0  # mm, the same of somebody in a room
 POSSIBLE = (10.0, 1e5)  # mm, the same of whatever may hold a head, where somebody tells the unit
 
 #: What a unit is called that the size of the face tells, because no usual one makes it a person's.
@@ -52,6 +53,11 @@ def is_human(size: float, smallest: float = GROWN) -> bool:
 def is_body(extent: float) -> bool:
     """Whether a scan with this largest ``extent`` in mm is of more than a bust, and of no more than somebody."""
     return PLAUSIBLE[1] < extent <= BODY
+
+
+def is_scene(extent: float) -> bool:
+    """Whether a scan with this largest ``extent`` in mm is of more than a bust, and of no more than somebody in a room."""
+    return PLAUSIBLE[1] < extent <= SCENE
 
 
 def plausible_units(mesh: Mesh, unit: str | float | None = None) -> dict[str, float]:
