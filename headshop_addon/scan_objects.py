@@ -18,11 +18,12 @@ from ..sim.errors import InputError
 from ..sim.progress import Work, finish
 from ..sim.scan.joined import joined
 from ..sim.scan.orientation import Orientation
-from ..sim.scan.units import BY_FACE, unit_words
+from ..sim.scan.units import BY_FACE, UNITS, USUAL, unit_words
 from . import active, bridge, heads, pipeline, scan_landmarks
 from .scan_texture import with_pictures
 
 TURN = "headshop_turn"
+ROUNDED = 1e-6  # between two scales that are one
 
 
 def import_scan(context, path, unit: str | None = None, up: str | None = None) -> Work:
@@ -80,15 +81,25 @@ def unit_is_told(scan: bpy.types.Object) -> bool:
     return bool(heads.read_report(scan).get("scan", {}).get("unit_told", True))
 
 
-def resize(scan: bpy.types.Object, factor: float) -> None:
-    """Make the ``scan``, which is of no known unit, ``factor`` times as large, with the landmarks on it."""
+def usual_scales(scan: bpy.types.Object) -> list[float]:
+    """How many times as large the ``scan`` is in each usual unit as in the one that its file was read in."""
+    own = heads.read_report(scan).get("scan", {}).get("unit_scale", 1.0)
+    return [scale / own for scale in USUAL]
+
+
+def resize(scan: bpy.types.Object, factor: float) -> str:
+    """Make the ``scan``, which is of no known unit, ``factor`` times as large, with the landmarks on it; returns why, in a few
+    words."""
     scan.data.transform(Matrix.Scale(factor, 4))
     for item in scan_landmarks.entries(scan).values():
         item.co, item.found = factor * Vector(item.co), factor * Vector(item.found)
     facts = heads.read_report(scan).get("scan", {})
-    facts |= {"unit": BY_FACE, "unit_scale": factor * facts.get("unit_scale", 1.0)}
+    scale = factor * facts.get("unit_scale", 1.0)
+    name = next((name for name, usual in UNITS.items() if abs(scale / usual - 1) < ROUNDED), BY_FACE)
+    facts |= {"unit": name, "unit_scale": scale}
     facts["orientation"] = f"Read as {unit_words(facts['unit'], facts['unit_scale'])}."
     heads.write_report(scan, {"scan": facts})
+    return "no person's size" if name == BY_FACE else f"it is in {unit_words(name, scale)}"
 
 
 def _clear_view(context, obj) -> None:

@@ -27,7 +27,8 @@ class HEADSHOP_OT_find_landmarks(Job, bpy.types.Operator):
 
         self._scan = active.scan(context)
         any_size = not scan_objects.unit_is_told(self._scan)
-        return (yield from find_landmarks(bridge.object_to_mesh(self._scan), any_size=any_size))
+        usual = scan_objects.usual_scales(self._scan)
+        return (yield from find_landmarks(bridge.object_to_mesh(self._scan), any_size=any_size, usual=usual))
 
     def finish(self, context, result):
         """Store them on the scan, which is brought to a person's size if it is in no unit."""
@@ -35,9 +36,9 @@ class HEADSHOP_OT_find_landmarks(Job, bpy.types.Operator):
 
         said = result.summary()
         if result.unit_scale != 1.0:
-            scan_objects.resize(self._scan, result.unit_scale)
+            why = scan_objects.resize(self._scan, result.unit_scale)
             scan_objects.look_at(context)
-            said += f"; no person's size, so the scan is {result.unit_scale:.3g} times as large now"
+            said += f"; {why}, so the scan is {result.unit_scale:.3g} times as large now"
         scan_landmarks.take_found(self._scan, result)
         context.scene.headshop.show_landmarks = True
         return f"{self._scan.name}: {said}"

@@ -62,7 +62,7 @@ def test_a_scan_of_no_persons_size_becomes_one_with_its_landmarks(addon, importe
     scan, asked = imported(10.0), []
     places = {n: 0.5 * p for n, p in reference.landmark_positions().items() if n in ("prn", "gn", "n", "en_l")}
 
-    def found(mesh, any_size=False):
+    def found(mesh, any_size=False, usual=()):
         asked.append(any_size)
         yield Progress(0.5, "")
         return FoundLandmarks(places, dict.fromkeys(places, 0.9), (), (), 0.5, 1.0)
@@ -78,6 +78,25 @@ def test_a_scan_of_no_persons_size_becomes_one_with_its_landmarks(addon, importe
     assert _facts(scan)["unit"] == BY_FACE and _facts(scan)["unit_scale"] == pytest.approx(5.0)
     assert "units of 5 mm" in _facts(scan)["orientation"]
     told = imported(10.0, unit="cm")
-    monkeypatch.setattr(find, "find_landmarks", lambda mesh, any_size=False: asked.append(any_size) or found(mesh))
+    monkeypatch.setattr(find, "find_landmarks", lambda mesh, any_size=False, **_: asked.append(any_size) or found(mesh))
     addon.ops.headshop.find_landmarks()
     assert told is not scan and asked[1] is False
+
+
+def test_a_room_that_was_read_as_a_head_in_inches_is_one_in_metres(addon, imported, monkeypatch):
+    """A scan of 4 m is 4 inches across as well, a face's size; which of the two it is its face tells."""
+    scan, offered = imported(25.4), []
+    assert _facts(scan)["unit"] == "in"
+    metres = 1000 / 25.4
+
+    def found(mesh, any_size=False, usual=()):
+        offered.extend(usual)
+        yield Progress(0.5, "")
+        return FoundLandmarks({"prn": np.zeros(3)}, {"prn": 0.9}, (), (), metres, 1.0)
+
+    monkeypatch.setattr(find, "find_landmarks", found)
+    before = _extent(scan)
+    assert addon.ops.headshop.find_landmarks() == {"FINISHED"}
+    assert sorted(offered) == pytest.approx([1 / 25.4, 10 / 25.4, 1.0, metres])
+    assert _extent(scan) == pytest.approx(metres * before, rel=1e-5)
+    assert _facts(scan)["unit"] == "m" and _facts(scan)["orientation"] == "Read as metres."

@@ -25,7 +25,7 @@ from headshop.sim.landmarks.verdict import Verdict
 from headshop.sim.mesh import Mesh
 from headshop.sim.progress import Progress, finish
 from headshop.sim.scan.ply import write_ply
-from headshop.sim.scan.units import plausible_units
+from headshop.sim.scan.units import USUAL, plausible_units
 
 #: Middle, from the chin, and half the size, mm, of what a body is made of.
 BODY = [((0, 20, -330), (190, 115, 260)), ((0, 20, -600), (170, 120, 170))] + [
@@ -193,7 +193,7 @@ def test_the_head_of_a_body_in_no_unit_is_as_large_as_most(reference, body, monk
         monkeypatch.setattr(placed_face, "_begun_from", begun)
         for scale, own in ((470.0, 2.0), (1000.0, 1000.0)):
             seen = (Verdict(False, 1.0, 0.9), scale, "seen", None, None)
-            assert finish(placed_face._placed_on((seen, reference.skin), reference))[:2] == (own, taken)
+            assert finish(placed_face._placed_on((seen, reference.skin), reference, USUAL))[:2] == (own, taken)
 
 
 def test_a_room_is_looked_at_piece_by_piece(body, in_a_room):

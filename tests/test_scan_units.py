@@ -10,7 +10,17 @@ from headshop.sim.errors import InputError
 from headshop.sim.mesh import Mesh
 from headshop.sim.scan.face_match import surface_samples
 from headshop.sim.scan.orientation import detect, rotations
-from headshop.sim.scan.units import BY_FACE, LEAST, MOST, STEP, is_human, plausible_units, sizes_to_try, unit_words
+from headshop.sim.scan.units import (
+    BY_FACE,
+    LEAST,
+    MOST,
+    STEP,
+    is_human,
+    larger_units,
+    plausible_units,
+    sizes_to_try,
+    unit_words,
+)
 
 
 @pytest.fixture(scope="module")
@@ -71,3 +81,18 @@ def test_what_is_no_face_is_refused_in_any_size():
 def test_units_in_words():
     assert unit_words("cm", 10.0) == "centimetres" and unit_words("custom", 13.7) == "units of 13.7 mm"
     assert unit_words(BY_FACE, 16.404) == "units of 16.4 mm, a guess that makes the head as large as most"
+
+
+def test_a_room_is_read_in_the_unit_that_makes_it_one(reference):
+    """3 m of floor below a head: no unit makes a head of that, nor does the face's size show."""
+    floor = np.array([(-1500.0, -1500, -250), (1500, -1500, -250), (1500, 1500, -250), (-1500, 1500, -250)])
+    skin = reference.skin
+    triangles = np.concatenate([skin.triangles, len(skin.vertices) + np.array([(0, 1, 2), (0, 2, 3)])])
+    room = Mesh.from_triangles(np.concatenate([skin.vertices, floor]), triangles)
+    assert dict(larger_units(surface_samples(room))) == {"mm": 1.0}
+    assert detect(room).unit == "mm"
+    metres = room.moved(room.vertices / 1000)
+    assert dict(larger_units(surface_samples(metres))) == {"m": 1000.0}
+    assert detect(metres, reference.landmark_positions()).unit == "m"  # and not a face in inches
+    with pytest.raises(InputError, match="no head"):
+        detect(room.moved(room.vertices * 1e6))

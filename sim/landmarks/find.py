@@ -12,6 +12,7 @@ from ..cylindrical.second_opinion import weighed
 from ..mesh import Mesh
 from ..progress import Progress, Work, portion
 from ..scan.depth_jumps import depth_jumps
+from ..scan.units import USUAL
 from .above_beard import without_beards_lead
 from .beards import beard_over, is_above_beard
 from .confidence import judge, judge_together, sure_as_corners
@@ -70,20 +71,23 @@ class FoundLandmarks:
         return words + (f", {len(self.missing)} missing" if self.missing else "")
 
 
-def find_landmarks(mesh: Mesh, reference: Head | None = None, unit_scales=(1.0,), any_size: bool = False) -> Work:
+def find_landmarks(
+    mesh: Mesh, reference: Head | None = None, unit_scales=(1.0,), any_size: bool = False, usual=USUAL
+) -> Work:
     """Work returning the `FoundLandmarks` of a cleaned scan, turned any way.
 
     unit_scales : mm per unit of the mesh, the likeliest of which is found as well
     any_size : whether none of them may be right: if none makes the head a person's, it is brought to the size of most
+    usual : mm per unit of the mesh if its file is in a usual unit, in which it may be a body or a room then
 
     Raises
     ------
     InputError : there is no face in it.
     """
-    return on_one_thread(_finding(mesh, reference, unit_scales, any_size))
+    return on_one_thread(_finding(mesh, reference, unit_scales, any_size, usual))
 
 
-def _finding(mesh: Mesh, reference: Head | None, unit_scales, any_size: bool) -> Work:
+def _finding(mesh: Mesh, reference: Head | None, unit_scales, any_size: bool, usual) -> Work:
     """`find_landmarks`."""
     yield Progress(0.0, LOOKING)
     reference = reference or reference_head()
@@ -92,7 +96,7 @@ def _finding(mesh: Mesh, reference: Head | None, unit_scales, any_size: bool) ->
     jumps = depth_jumps(mesh.vertices, mesh.triangles)
     mesh = Mesh.from_triangles(mesh.vertices, mesh.triangles[~jumps]) if jumps.any() else mesh
     yield Progress(0.05, LOOKING)
-    placing = place_face(mesh, reference, space, unit_scales, any_size)
+    placing = place_face(mesh, reference, space, unit_scales, any_size, usual)
     scale, fit, target, space = yield from portion(placing, 0.05, 0.73)
     fit = yield from portion(at_rest(reference, space, target, fit), 0.73, 0.75)
     fit = yield from portion(with_likelier_ears(space, target, fit), 0.75, 0.77)

@@ -12,7 +12,7 @@ from ..mesh import Mesh, vertex_areas
 from ..progress import Progress, Work, portion
 from ..scan.face_match import FINE, surface_samples, thinned
 from ..scan.scenery import in_walls, only, pieces, without
-from ..scan.units import BODY, PLAUSIBLE, UNITS, is_body, is_scene
+from ..scan.units import BODY, PLAUSIBLE, USUAL, is_body, is_scene
 from .looking import looked
 from .looks import ANY_SIZE, PLAIN, WHOLE
 from .pose_search import LOOKING
@@ -33,15 +33,15 @@ STATURES = (1750.0, 1100.0)
 SIMILAR = 1.2  # between two scales that are as good as one: a face is found if it is .72 to 1.22 of the reference
 
 
-def body_scales(mesh: Mesh) -> list[float]:
-    """mm per unit, the usual ones in which the mesh may be somebody from head to foot; none if it is too bulky for that."""
-    return [scale for scale in UNITS.values() if is_body(_extent(mesh) * scale)] if _is_thin(mesh) else []
+def body_scales(mesh: Mesh, usual=USUAL) -> list[float]:
+    """mm per unit, the ``usual`` ones in which the mesh may be somebody from head to foot; none if it is too bulky for that."""
+    return [scale for scale in usual if is_body(_extent(mesh) * scale)] if _is_thin(mesh) else []
 
 
-def other_scales(mesh: Mesh, known) -> list[float]:
-    """mm per unit, beside those that are ``known``, of what is less usual than `body_scales`: the usual ones in which it is a
+def other_scales(mesh: Mesh, known, usual=USUAL) -> list[float]:
+    """mm per unit, beside those that are ``known``, of what is rarer than `body_scales`: the ``usual`` ones in which it is a
     room or has walls, and those that make a body of no usual unit as large as people are."""
-    scales = [scale for scale in UNITS.values() if is_scene(_extent(mesh) * scale)]
+    scales = [scale for scale in usual if is_scene(_extent(mesh) * scale)]
     scales = [scale for scale in scales if in_walls(mesh, scale).any()]
     if _is_thin(mesh):
         scales += [stature / _extent(mesh) for stature in STATURES]

@@ -12,7 +12,7 @@ from ..errors import InputError
 from ..mesh import Mesh
 from ..progress import Work, portion
 from ..scan.face_match import face_template
-from ..scan.units import UNITS
+from ..scan.units import USUAL
 from .any_size import face_of_any_size, of_human_size, of_most, resized
 from .beards import above_beard, template_above
 from .confidence import like_ears
@@ -40,12 +40,15 @@ LIKELY_EARS, LIKELIER = 0.75, 0.1
 AT_REST, AGAIN = 1.5, 2
 
 
-def place_face(mesh: Mesh, reference: Head, space: ShapeSpace, unit_scales, any_size: bool = False) -> Work:
+def place_face(
+    mesh: Mesh, reference: Head, space: ShapeSpace, unit_scales, any_size: bool = False, usual=USUAL
+) -> Work:
     """Work returning mm per unit of the mesh, one of ``unit_scales``, the `ShapeFit`, the `Surface` it lies on and the
     `ShapeSpace` it is of, ``space`` or that of an infant.
 
     any_size : whether none of ``unit_scales`` may be right, so that the head is brought to the size of most people's if it
         is no person's in those
+    usual : mm per unit in which it may be a body or a room then
 
     Raises
     ------
@@ -64,7 +67,7 @@ def place_face(mesh: Mesh, reference: Head, space: ShapeSpace, unit_scales, any_
 
     head = yield from portion(of_body(unit_scales), 0.0, 0.5)
     if head is not None:
-        return (yield from portion(_placed_on(head, reference), 0.5, 1.0))
+        return (yield from portion(_placed_on(head, reference, [*known, *usual]), 0.5, 1.0))
     for look, (low, middle, high) in zip(LOOKS, PARTS, strict=True):
         if look.infant:
             space, template = infant_space(reference, grown), infant_points(reference, face_template(reference))
@@ -84,26 +87,28 @@ def place_face(mesh: Mesh, reference: Head, space: ShapeSpace, unit_scales, any_
                 own = yield from portion(of_human_size(reference, best, lies(of, fit).scale, or_infant), high, 1.0)
             return best[1:] if own else (yield from portion(brought_to(of_most(best)), high, 1.0))
         if any_size and look is LOOKS[0] and (best is None or best[0].doubtful):
-            head = yield from portion(of_body([x for x in body_scales(mesh) if x not in known]), middle, high)
+            head = yield from portion(of_body([x for x in body_scales(mesh, usual) if x not in known]), middle, high)
             if head is not None:
-                return (yield from portion(_placed_on(head, reference), high, 1.0))
+                return (yield from portion(_placed_on(head, reference, [*known, *usual]), high, 1.0))
             work = face_of_any_size(mesh, reference, space, template, unit_scales, or_infant)
             scale, closer = yield from portion(work, high, SIZED)
             if scale is not None:
                 return (yield from portion(brought_to(scale), SIZED, 1.0))
-            head = yield from portion(of_body(other_scales(mesh, [*known, *body_scales(mesh)])), SIZED, ODDLY_SIZED)
+            head = yield from portion(
+                of_body(other_scales(mesh, [*known, *body_scales(mesh, usual)], usual)), SIZED, ODDLY_SIZED
+            )
             if head is not None:
-                return (yield from portion(_placed_on(head, reference), ODDLY_SIZED, 1.0))
+                return (yield from portion(_placed_on(head, reference, [*known, *usual]), ODDLY_SIZED, 1.0))
             unit_scales = unit_scales or closer
     raise InputError(NO_FACE.format("" if any_size else " and that its unit (--units) is right"))
 
 
-def _placed_on(head, reference) -> Work:
+def _placed_on(head, reference, usual) -> Work:
     """Work returning what `place_face` does for a ``head`` out of a larger scan, what `head_of_body` returns: the face as it
     was seen, or begun from there on all around it, whichever fits better.
 
     What is around it may be cut from its part, as an ear, or be shoulders and chairs, on which neck and jaw lie worse. In no
-    usual unit the head is brought to the size of most.
+    ``usual`` unit the head is brought to the size of most.
     """
     seen, around = head
     _, scale, fit, _, space = seen
@@ -111,7 +116,7 @@ def _placed_on(head, reference) -> Work:
     target = facing_out(space, Surface(around.vertices * scale, around.triangles, smooth=NORMALS).coarser(), pose)
     rival = yield from _begun_from([pose], reference, scale, target, space)
     best = min((seen, rival), key=lambda t: t[0]) if rival else seen
-    return (best if scale in UNITS.values() else resized(reference, best, of_most(best) / scale))[1:]
+    return (best if scale in usual else resized(reference, best, of_most(best) / scale))[1:]
 
 
 def _is_face(look, result) -> bool:

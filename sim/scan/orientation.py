@@ -11,7 +11,18 @@ from ..errors import InputError
 from ..mesh import Mesh
 from ..progress import Progress, Work, finish, portion
 from .face_match import best_turns, face_template, surface_samples
-from .units import BY_FACE, CUSTOM, SMALLEST, is_human, no_head, sizes_to_try, unit_of_landmarks, unit_words, units_of
+from .units import (
+    BY_FACE,
+    CUSTOM,
+    SMALLEST,
+    is_human,
+    larger_units,
+    no_head,
+    sizes_to_try,
+    unit_of_landmarks,
+    unit_words,
+    units_of,
+)
 
 LOOKING = "Finding out which way is up"
 AXES = {sign + name: s * np.eye(3)[k] for k, name in enumerate("XYZ") for sign, s in (("+", 1.0), ("-", -1.0))}
@@ -103,7 +114,8 @@ def detecting(
     if landmarks is not None:
         turn = _turn_of_landmarks(landmarks, reference.landmark_positions())
         if turn is not None:
-            name, scale = unit_of_landmarks(points, landmarks, units, unit is not None)
+            usual = units if unit is not None else [*units, *larger_units(points)]
+            name, scale = unit_of_landmarks(points, landmarks, usual, unit is not None)
             return _by_landmarks(turn, allowed, name, scale, picked)
     template = face_template(reference)
     found = yield from portion(_placements(points, template, allowed, units), 0.0, 0.3)
@@ -114,6 +126,8 @@ def detecting(
         guesses = yield from portion(_placements(points, template, allowed, guesses), 0.3, 0.9)
         if guesses[0][0] < min([PLAIN, *(entry[0] for entry in found)]):
             found = yield from portion(_sized(points, template, allowed, guesses[0], units), 0.9, 1.0)
+    if not found:
+        found = yield from portion(_placements(points, template, allowed, larger_units(points)), 0.9, 1.0)
     if not found:
         raise no_head(points)
     misfit, name, scale, rotation, _ = found[0]

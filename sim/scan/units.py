@@ -14,6 +14,7 @@ from .face_match import surface_samples
 
 #: Unit -> mm.
 UNITS = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
+USUAL = tuple(UNITS.values())
 
 #: Largest extent of a scan of a face patch (the smallest) and of a bust (the largest), mm.
 PLAUSIBLE = (90.0, 900.0)
@@ -89,6 +90,12 @@ def units_of(points: np.ndarray, unit, called: str = CUSTOM) -> list[tuple[str, 
     least, most = PLAUSIBLE
     units = [(name, scale) for name, scale in UNITS.items() if least <= extent * scale <= most]
     return units or [(name, scale) for name, scale in UNITS.items() if is_body(extent * scale)]
+
+
+def larger_units(points: np.ndarray) -> list[tuple[str, float]]:
+    """(name, mm) of the usual units in which samples (n, 3) of a scan are more than a bust, as somebody in a room."""
+    extent = np.ptp(points, axis=0).max()
+    return [(name, scale) for name, scale in UNITS.items() if is_scene(extent * scale)]
 
 
 def told_unit(unit: str | float, called: str = CUSTOM) -> tuple[str, float]:
