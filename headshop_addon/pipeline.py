@@ -61,14 +61,15 @@ def prepare_scan(raw: Mesh, landmarks=None, unit=None, up=None, seconds=None) ->
     """Work that cleans a mesh in any unit and axes and brings it to mm, Z up, face toward -Y; see `load_scan`."""
     mesh, counts = yield from portion(cleaning(raw), 0.0, 0.5)
     found = yield from portion(detecting(mesh, landmarks, unit=unit, up=up), 0.5, 1.0)
-    return _upright(mesh, counts, found, unit, seconds)
+    return _upright(mesh, counts, found, unit, up, seconds)
 
 
-def _upright(mesh, counts, found, told, seconds):
+def _upright(mesh, counts, found, unit, up, seconds):
     report = counts | {
         "unit": found.unit,
         "unit_scale": found.unit_scale,
-        "unit_told": told is not None,
+        "unit_told": unit is not None,
+        "up_told": up is not None,
         "up": found.up,
         "front": found.front,
         "certain": bool(found.certain),
@@ -98,7 +99,7 @@ def load_scan_alone(path, unit: str | None = None, up: str | None = None) -> Wor
         found = yield from portion(work, 0.05, 1.0)
         name = next((name for name, scale in (units | UNITS).items() if scale == found.unit_scale), BY_FACE)
         axes = detect(mesh, found.positions, unit=found.unit_scale, up=up, called=name, picked=False)
-    return _upright(mesh, counts, axes, unit, seconds), found.placed(axes.turn(found.positions))
+    return _upright(mesh, counts, axes, unit, up, seconds), found.placed(axes.turn(found.positions))
 
 
 def add_scan(scan: Scan, name: str, scene: bpy.types.Scene | None = None) -> bpy.types.Object:

@@ -15,14 +15,16 @@ from mathutils import Matrix, Vector
 from ..sim.adapt.landmarks import read_landmark_file, write_landmarks
 from ..sim.anatomy.landmark_names import SKIN
 from ..sim.errors import InputError
+from ..sim.landmarks.find import FoundLandmarks
 from ..sim.progress import Work, finish
 from ..sim.scan.joined import joined
-from ..sim.scan.orientation import Orientation
+from ..sim.scan.orientation import Orientation, axis_names, detect
 from ..sim.scan.units import BY_FACE, UNITS, USUAL, unit_words
 from . import active, bridge, heads, pipeline, scan_landmarks
 from .scan_texture import with_pictures
 
 TURN = "headshop_turn"
+IN_PLACE = "headshop_in_place"  # whether the scan stands in the place of an object that it was adopted from
 ROUNDED = 1e-6  # between two scales that are one
 
 
@@ -59,6 +61,7 @@ def adopt(context, original: bpy.types.Object) -> Work:
     obj = _add(context, scan, f"{original.name} Scan")
     turn = scan.orientation.matrix  # mm to mm here: the translation is zero, so it serves for metres too
     obj.matrix_world = original.matrix_world @ Matrix(np.linalg.inv(turn).tolist())
+    obj[IN_PLACE] = True
     original.hide_set(True)
     look_at(context)
     return obj
@@ -100,6 +103,34 @@ def resize(scan: bpy.types.Object, factor: float) -> str:
     facts["orientation"] = f"Read as {unit_words(facts['unit'], facts['unit_scale'])}."
     heads.write_report(scan, {"scan": facts})
     return "no person's size" if name == BY_FACE else f"it is in {unit_words(name, scale)}"
+
+
+def stand_upright(scan: bpy.types.Object, found: FoundLandmarks) -> FoundLandmarks:
+    """Turn the ``scan`` by as many quarter turns as the landmarks ``found`` on it tell, unless an artist said which way is up;
+    returns them on what it is then.
+
+    Without them a face is laid on all of the scan, which in bodies and rooms lies anywhere. What was adopted stays in its
+    original's place.
+    """
+    facts = heads.read_report(scan).get("scan", {})
+    if facts.get("up_told", True):
+        return found
+    turn = detect(bridge.object_to_mesh(scan), found.positions, unit=1.0).rotation
+    if np.allclose(turn, np.eye(3)):
+        return found
+    matrix = Matrix(turn.tolist())
+    scan.data.transform(matrix.to_4x4())
+    for item in scan_landmarks.entries(scan).values():
+        item.co, item.found = matrix @ Vector(item.co), matrix @ Vector(item.found)
+    if scan.get(IN_PLACE):
+        scan.matrix_world = scan.matrix_world @ matrix.to_4x4().inverted()
+    whole = turn @ _rotation(scan)
+    scan[TURN] = whole.ravel().tolist()
+    up, front = axis_names(whole)
+    said = f"Read as {unit_words(facts['unit'], facts['unit_scale'])}, {up} up, face toward {front}"
+    said += ": the landmarks that were found say so."
+    heads.write_report(scan, {"scan": facts | {"up": up, "front": front, "certain": True, "orientation": said}})
+    return found.placed({name: turn @ place for name, place in found.positions.items()})
 
 
 def _clear_view(context, obj) -> None:

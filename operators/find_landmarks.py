@@ -31,7 +31,7 @@ class HEADSHOP_OT_find_landmarks(Job, bpy.types.Operator):
         return (yield from find_landmarks(bridge.object_to_mesh(self._scan), any_size=any_size, usual=usual))
 
     def finish(self, context, result):
-        """Store them on the scan, which is brought to a person's size if it is in no unit."""
+        """Store them on the scan, which is brought to a person's size if it is in no unit, and set upright."""
         from ..headshop_addon import scan_objects
 
         said = result.summary()
@@ -39,6 +39,10 @@ class HEADSHOP_OT_find_landmarks(Job, bpy.types.Operator):
             why = scan_objects.resize(self._scan, result.unit_scale)
             scan_objects.look_at(context)
             said += f"; {why}, so the scan is {result.unit_scale:.3g} times as large now"
-        scan_landmarks.take_found(self._scan, result)
+        placed = scan_objects.stand_upright(self._scan, result)
+        if placed is not result:
+            scan_objects.look_at(context)
+            said += "; the scan was turned upright by them"
+        scan_landmarks.take_found(self._scan, placed)
         context.scene.headshop.show_landmarks = True
         return f"{self._scan.name}: {said}"

@@ -132,7 +132,7 @@ def detecting(
         raise no_head(points)
     misfit, name, scale, rotation, _ = found[0]
     rivals = [e for e in found[1:] if e[1] != name or not np.allclose(e[3], rotation)]
-    up, front = _names(rotation)
+    up, front = axis_names(rotation)
     extent = np.ptp(points, axis=0).max() * scale
     reason = f"read as {unit_words(name, scale)} ({extent:.0f} mm across), {up} up, face toward {front}"
     certain = not rivals or (misfit < POOR and rivals[0][0] > RIVAL * misfit)
@@ -142,7 +142,7 @@ def detecting(
         reason += f"; unsure, because nothing in the scan resembles a face (misfit {misfit:.1f} mm)"
     elif not certain:
         other = rivals[0]
-        what = "{} up, face toward {}".format(*_names(other[3])) if other[1] == name else f"{other[1]} for the unit"
+        what = "{} up, face toward {}".format(*axis_names(other[3])) if other[1] == name else f"{other[1]} for the unit"
         reason += f"; unsure, because {what} fits nearly as well ({other[0]:.1f} mm against {misfit:.1f} mm)"
     else:
         reason += f" (a face fits to {misfit:.1f} mm)"
@@ -187,7 +187,9 @@ def _rotation(up: str, front: str) -> np.ndarray:
     return np.stack([np.cross(back, top), back, top])
 
 
-def _names(rotation):
+def axis_names(rotation: np.ndarray) -> tuple[str, str]:
+    """Which of a scan's axes point up and where the face looks, like ``+Z`` and ``-Y``; ``rotation`` : as of `Orientation`."""
+
     def name(v):
         return next(k for k, axis in AXES.items() if axis @ v > 0.5)
 
@@ -208,7 +210,7 @@ def _allowed(up, front):
     up, front = _axis(up), _axis(front)
     if up and front and up[1] == front[1]:
         raise InputError(f"The scan cannot have {up} up and its face toward {front}: give two different axes.")
-    return [r for r in rotations() if up in (None, _names(r)[0]) and front in (None, _names(r)[1])]
+    return [r for r in rotations() if up in (None, axis_names(r)[0]) and front in (None, axis_names(r)[1])]
 
 
 def _turn_of_landmarks(given, canonical):
@@ -227,7 +229,7 @@ def _turn_of_landmarks(given, canonical):
 def _by_landmarks(turn, allowed, name, scale, picked):
     rotation = max(allowed, key=lambda r: np.trace(r.T @ turn))
     tilt = np.degrees(np.arccos(np.clip((np.trace(rotation.T @ turn) - 1) / 2, -1, 1)))
-    up, front = _names(rotation)
+    up, front = axis_names(rotation)
     certain = bool(tilt < 35)
     reason = f"Read as {unit_words(name, scale)}, {up} up, face toward {front}"
     marks = "the landmarks" if picked else "the landmarks that were found"
