@@ -144,7 +144,8 @@ def test_ends_are_what_sticks_out(body):
 def test_what_is_bulky_is_no_body(body):
     assert body_scales(body) == [1.0]
     assert body_scales(body.moved(body.vertices / 10)) == [10.0]
-    assert body_scales(Mesh.from_triangles(*blob((0, 0, 0), (700, 700, 700)))) == []
+    bulky = Mesh.from_triangles(*blob((0, 0, 0), (700, 700, 700)))
+    assert body_scales(bulky) == [] and other_scales(bulky, [], [1.0]) == []
 
 
 @pytest.fixture(scope="module")
@@ -206,8 +207,31 @@ def test_a_room_is_looked_at_piece_by_piece(body, in_a_room):
     assert (
         sum(len(part.faces) == len(piece.faces) for piece, part in parts) >= 3
     )  # blobs, and the head, all in one piece
-    assert all(np.ptp(part.vertices, axis=0).max() < 900 for _, part in parts)
+    assert all(90 < np.ptp(part.vertices, axis=0).max() < 900 for _, part in parts)
     assert max(len(piece.faces) for piece, _ in parts) < own
+
+
+def test_the_ends_of_two_people_are_looked_at_in_turn(body):
+    """And what is smaller than a face is not."""
+    bodies = [blob((x, 0, 0), (150.0, 100.0, 850.0)) for x in (0, 900)]
+    parts = [*bodies, blob((450.0, 300, 0), (30.0, 30.0, 30.0))]
+    parts.append(wall((-500.0, 600, -900), (2000, 0, 0), (0, 0, 1800)))
+    start = np.cumsum([0] + [len(points) for points, _ in parts])
+    triangles = np.concatenate([t + s for (_, t), s in zip(parts, start, strict=False)])
+    scan = Mesh.from_triangles(np.concatenate([points for points, _ in parts]), triangles)
+    seen = [part.vertices.mean(axis=0) for _, part in parts_of(scan, 1.0)]
+    second = [place[0] > 450 for place in seen]
+    assert len(seen) > 3 and all(one != other for one, other in zip(second[:-1], second[1:], strict=True))
+    assert all(abs(place[1]) < 100 for place in seen)
+
+
+def test_a_speck_is_no_end(body):
+    far = body.vertices.max(axis=0) + 600
+    speck = Mesh.from_triangles([*body.vertices, far, far + [9, 0, 0], far + [0, 9, 0]], body.triangles)
+    corner = len(body.vertices)
+    speck = Mesh.from_triangles(speck.vertices, [*body.triangles, (corner, corner + 1, corner + 2)])
+    assert np.linalg.norm(ends(head_of_body.surface_samples(speck)) - far, axis=1).min() < 50
+    assert parts_of(speck, 1.0) and all(part.vertices.max() < far.max() - 1 for _, part in parts_of(speck, 1.0))
 
 
 def test_a_body_without_walls_is_looked_at_by_its_ends(body):
@@ -251,3 +275,33 @@ def test_the_unit_of_a_body_has_its_name(body, monkeypatch, tmp_path):
     monkeypatch.setattr(pipeline, "find_landmarks", found)
     scan, _ = finish(pipeline.load_scan_alone(path))
     assert scan.report["unit"] == "cm" and scan.report["unit_scale"] == 10.0
+
+
+def test_rooms_and_odd_bodies_are_looked_at_when_no_face_is_seen_in_any_size(reference, body, monkeypatch):
+    asked, space = [], SimpleNamespace()
+
+    def nothing(*_):
+        yield Progress(0.5, "")
+        return []
+
+    def of_body(mesh, reference, space, template, scales):
+        asked.append(list(scales))
+        yield Progress(0.5, "")
+        return "a head" if len(asked) == 3 else None
+
+    def sized(*_):
+        yield Progress(0.5, "")
+        return None, []
+
+    def placed(head, reference, usual):
+        yield Progress(0.5, "")
+        return head, usual
+
+    monkeypatch.setattr(placed_face, "looked", nothing)
+    monkeypatch.setattr(placed_face, "face_of_any_size", sized)
+    monkeypatch.setattr(placed_face, "head_of_body", of_body)
+    monkeypatch.setattr(placed_face, "_placed_on", placed)
+    usual = (0.5, 1.0, 40.0)
+    head = finish(placed_face.place_face(body, reference, space, [1.0], any_size=True, usual=usual))
+    assert head == ("a head", [1.0, *usual])
+    assert asked == [[1.0], [], other_scales(body, [1.0], usual)] and len(asked[2]) == 1

@@ -72,6 +72,8 @@ def test_walls_that_are_drawn_are_walls(head):
     square = np.array([(-900.0, 400.0, -900.0), (900, 400, -900), (900, 400, 900), (-900, 400, 900)])
     scan = together(head, Mesh.from_triangles(square, [(0, 1, 2), (0, 2, 3)]))
     assert np.flatnonzero(in_walls(scan, 1.0)).tolist() == [len(head.triangles), len(head.triangles) + 1]
+    scan = together(scan, sheet((-600.0, 500.0, -700.0), (1200, 0, 0), (0, 0, 1200)))  # and a scanned one
+    assert in_walls(scan, 1.0)[len(head.triangles) :][:2].all()
 
 
 def test_a_single_triangle_has_no_walls():

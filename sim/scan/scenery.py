@@ -10,8 +10,7 @@ from .clean import components
 from .face_match import surface_samples, thinned
 
 APART = 20.0  # mm between the samples that are looked at
-AROUND = 70.0  # mm around each that are flat or not
-FLAT = 9.0  # mm that they lie off their own plane at most, root mean square: phones' scans of walls are as rough
+AROUND = 70.0  # mm around each that tell which way it faces: phones' scans of walls are 8 mm rough
 THICK = 25.0  # mm to either side of its plane that a wall takes
 ALIKE = np.cos(np.radians(20))  # between its normal and that of each place in it
 LARGE = 0.2e6  # mm², the smallest: a chair's back has .2 m², and of a chest or a back .07 m² lie as flat
@@ -58,8 +57,8 @@ def only(mesh: Mesh, triangles) -> Mesh:
 
 def _flat_places(points, facing):
     """(n,) bool: which of ``points`` (n, 3) mm, evenly spread, are of walls; ``facing`` (n, 3) : the surface's normals."""
-    normal, off = _planes_at(points, facing)
-    left, out = off < FLAT, np.zeros(len(points), dtype=bool)
+    normal = _normals_at(points, facing)
+    left, out = np.ones(len(points), dtype=bool), np.zeros(len(points), dtype=bool)
     for _ in range(WALLS):
         at = np.flatnonzero(left)
         if len(at) * APART**2 < LARGE:
@@ -82,9 +81,8 @@ def _within(points, normals, normal, along):
     return (np.abs(points @ normal - along) < THICK) & (np.abs(normals @ normal) > ALIKE)
 
 
-def _planes_at(points, facing):
-    """Unit normals (n, 3) of the planes through what lies around each of ``points`` (n, 3) mm and faces the same way, and how
-    far that lies off them (n,) mm; infinitely far where too little does."""
+def _normals_at(points, facing):
+    """Unit normals (n, 3) of the planes through what lies around each of ``points`` (n, 3) mm and faces the same way."""
     n = len(points)
     pairs = cKDTree(points).query_pairs(AROUND, output_type="ndarray")
     # A board has two sides.
@@ -99,7 +97,4 @@ def _planes_at(points, facing):
     spread = (square + near @ square) / count[:, None] - middle[:, one] * middle[:, other]
     matrix = np.empty((n, 3, 3))
     matrix[:, one, other] = matrix[:, other, one] = spread
-    value, vector = np.linalg.eigh(matrix)
-    off = np.sqrt(np.maximum(value[:, 0], 0.0))
-    off[count < 6] = np.inf
-    return vector[:, :, 0], off
+    return np.linalg.eigh(matrix)[1][:, :, 0]
