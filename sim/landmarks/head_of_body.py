@@ -61,7 +61,7 @@ def head_of_body(mesh: Mesh, reference: Head, space: ShapeSpace, template, scale
         for j, (piece, part) in enumerate(parts):
             low, high = ((k + (j + more) / len(parts)) / len(scales) for more in (0, 1))
             seen = yield from portion(looked(ANY_SIZE, part, reference, space, template, [scale], 0.7), low, high)
-            seen = [result for result in seen if is_plain(result)]
+            seen = [result for result in seen if _is_plain(result)]
             if seen:
                 best = min(seen, key=lambda t: t[0])
                 _, _, fit, _, of = best
@@ -87,7 +87,7 @@ def parts_of(mesh: Mesh, scale: float) -> list[tuple[Mesh, Mesh]]:
     return [(piece, part) for *_, piece, part in ranked if len(part.faces) >= FEW][:PARTS]
 
 
-def is_plain(result) -> bool:
+def _is_plain(result) -> bool:
     """Whether ``result``, one of those of `looked`, is plainly a whole face."""
     verdict, _, fit, _, space = result
     whole = share_of(space, fit) > WHOLE

@@ -9,12 +9,14 @@ from ..mesh import Mesh, vertex_normals
 from .clean import components
 from .face_match import surface_samples, thinned
 
-APART = 20.0  # mm between the samples that are looked at
+APART = 20.0  # mm between the samples that are looked at,
+MOST = 400  # and so many of them along the largest extent at most
 AROUND = 70.0  # mm around each that tell which way it faces: phones' scans of walls are 8 mm rough
 THICK = 25.0  # mm to either side of its plane that a wall takes
 ALIKE = np.cos(np.radians(20))  # between its normal and that of each place in it
 LARGE = 0.2e6  # mm², the smallest: a chair's back has .2 m², and of a chest or a back .07 m² lie as flat
-TRIED = 300  # places through which the next wall may go
+TRIED = 300  # places through which the next wall may go,
+TOLD = 20_000  # and so many that tell which of these most lie in
 WALLS = 20  # that are looked for
 LONG = 150.0  # mm, a side of a triangle of walls that are drawn, not scanned: the coarsest heads have sides of 30
 
@@ -25,9 +27,11 @@ def in_walls(mesh: Mesh, scale: float) -> np.ndarray:
     corners = points[triangles]
     drawn = np.linalg.norm(corners - corners[:, [1, 2, 0]], axis=2).max(axis=1) > LONG
     samples = surface_samples(mesh) * scale
-    samples = thinned(samples, max(int(np.ptp(samples, axis=0).max() / APART), 1))
+    cells = int(np.clip(np.ptp(samples, axis=0).max() / APART, 1, MOST))
+    area = (np.ptp(samples, axis=0).max() / cells) ** 2
+    samples = thinned(samples, cells)
     facing = vertex_normals(points, triangles)[cKDTree(points).query(samples)[1]]
-    flat = _flat_places(samples, facing)
+    flat = _flat_places(samples, facing, LARGE / area)
     if not flat.any():
         return drawn
     return drawn | flat[cKDTree(samples).query(corners.mean(axis=1))[1]]
@@ -55,22 +59,26 @@ def only(mesh: Mesh, triangles) -> Mesh:
     return Mesh.from_triangles(mesh.vertices[used], index.reshape(-1, 3))
 
 
-def _flat_places(points, facing):
-    """(n,) bool: which of ``points`` (n, 3) mm, evenly spread, are of walls; ``facing`` (n, 3) : the surface's normals."""
+def _flat_places(points, facing, least):
+    """(n,) bool: which of ``points`` (n, 3) mm, evenly spread, are of walls, each of ``least`` of them or more.
+
+    facing (n, 3) : the surface's normals there
+    """
     normal = _normals_at(points, facing)
     left, out = np.ones(len(points), dtype=bool), np.zeros(len(points), dtype=bool)
     for _ in range(WALLS):
         at = np.flatnonzero(left)
-        if len(at) * APART**2 < LARGE:
+        if len(at) < least:
             break
+        some = at[:: 1 + len(at) // TOLD]
         tried = at[:: 1 + len(at) // TRIED]
-        within = [_within(points[at], normal[at], normal[k], normal[k] @ points[k]) for k in tried]
-        best = max(within, key=np.count_nonzero)
+        within = (_within(points[some], normal[some], normal[k], normal[k] @ points[k]) for k in tried)
+        best = points[some[max(within, key=np.count_nonzero)]]
         # Through all of them, not the one alone.
-        middle = points[at[best]].mean(axis=0)
-        across = np.linalg.svd(points[at[best]] - middle, full_matrices=False)[2][2]
+        middle = best.mean(axis=0)
+        across = np.linalg.svd(best - middle, full_matrices=False)[2][-1]
         wall = at[_within(points[at], normal[at], across, across @ middle)]
-        if len(wall) * APART**2 < LARGE:
+        if len(wall) < least:
             break
         out[wall], left[wall] = True, False
     return out
