@@ -143,6 +143,7 @@ def test_ends_are_what_sticks_out(body):
 
 def test_what_is_bulky_is_no_body(body):
     assert body_scales(body) == [1.0]
+    assert other_scales(body, [1.0]) == pytest.approx([1100 / np.ptp(body.vertices[:, 2])])  # it may end at the hips
     assert body_scales(body.moved(body.vertices / 10)) == [10.0]
     bulky = Mesh.from_triangles(*blob((0, 0, 0), (700, 700, 700)))
     assert body_scales(bulky) == [] and other_scales(bulky, [], [1.0]) == []
@@ -208,18 +209,19 @@ def test_a_room_is_looked_at_piece_by_piece(body, in_a_room):
         sum(len(part.faces) == len(piece.faces) for piece, part in parts) >= 3
     )  # blobs, and the head, all in one piece
     assert all(90 < np.ptp(part.vertices, axis=0).max() < 900 for _, part in parts)
-    assert max(len(piece.faces) for piece, _ in parts) < own
+    assert max(len(piece.faces) for piece, _ in parts) < own + 8000  # a blob and a shelf, but no wall
 
 
 def test_the_ends_of_two_people_are_looked_at_in_turn(body):
-    """And what is smaller than a face is not."""
+    """And what is smaller than a face is not, nor a shred."""
     bodies = [blob((x, 0, 0), (150.0, 100.0, 850.0)) for x in (0, 900)]
-    parts = [*bodies, blob((450.0, 300, 0), (30.0, 30.0, 30.0))]
+    parts = [*bodies, blob((450.0, 300, 0), (30.0, 30.0, 30.0)), blob((450.0, 400, 0), (60.0, 4.0, 4.0))]
     parts.append(wall((-500.0, 600, -900), (2000, 0, 0), (0, 0, 1800)))
     start = np.cumsum([0] + [len(points) for points, _ in parts])
     triangles = np.concatenate([t + s for (_, t), s in zip(parts, start, strict=False)])
     scan = Mesh.from_triangles(np.concatenate([points for points, _ in parts]), triangles)
-    seen = [part.vertices.mean(axis=0) for _, part in parts_of(scan, 1.0)]
+    of_one = len(bodies[0][1])
+    seen = [part.vertices.mean(axis=0) for piece, part in parts_of(scan, 1.0) if len(piece.faces) <= of_one]
     second = [place[0] > 450 for place in seen]
     assert len(seen) > 3 and all(one != other for one, other in zip(second[:-1], second[1:], strict=True))
     assert all(abs(place[1]) < 100 for place in seen)
@@ -234,11 +236,24 @@ def test_a_speck_is_no_end(body):
     assert parts_of(speck, 1.0) and all(part.vertices.max() < far.max() - 1 for _, part in parts_of(speck, 1.0))
 
 
-def test_a_body_without_walls_is_looked_at_by_its_ends(body):
-    parts = parts_of(body, 1.0)
-    assert all(piece is body for piece, _ in parts)
-    assert len(parts) == len(ends(head_of_body.surface_samples(body)))
-    assert other_scales(body, [1.0]) == pytest.approx([1100 / np.ptp(body.vertices[:, 2])])  # it may end at the hips
+def test_a_body_without_walls_is_looked_at_by_its_ends():
+    """Of what lies around it, as the edges of a board below, nothing is as large; if it is in shreds itself, all are ends."""
+    points, triangles = blob((0, 0, 0), (150.0, 100.0, 850.0), 40)
+    one = Mesh.from_triangles(points, triangles)
+    parts = parts_of(one, 1.0)
+    assert len(parts) == len(ends(head_of_body.surface_samples(one))) > 3
+    assert all(len(piece.faces) == len(one.faces) for piece, _ in parts)
+    other, more = blob((700.0, 0, -840), (100.0, 4.0, 4.0))
+    both = Mesh.from_triangles(np.concatenate([points, other]), np.concatenate([triangles, more + len(points)]))
+    first, second = parts_of(both, 1.0)[:2]
+    assert len(first[0].faces) == len(one.faces) and len(second[0].faces) == len(both.faces)
+    low, high = (
+        Mesh.from_triangles(points, triangles[(points[triangles, 2] * side > 60).all(axis=1)]) for side in (-1, 1)
+    )
+    torn = Mesh.from_triangles(
+        np.concatenate([low.vertices, high.vertices]), [*low.triangles, *high.triangles + len(points)]
+    )
+    assert {len(piece.faces) for piece, _ in parts_of(torn, 1.0)} == {len(low.faces), len(high.faces), len(torn.faces)}
 
 
 def test_a_part_is_all_within_reach(body):

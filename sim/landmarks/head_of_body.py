@@ -20,11 +20,12 @@ from .shape_space import ShapeSpace
 from .verdict import ODD, share_of
 
 ENDS = 8  # of a body that are looked at: head, hands and feet, and what else sticks out
-PARTS = 16  # of a scan that are looked at
+PIECES, PARTS = 7, 16  # that a scan falls into, and parts of these, that are looked at
 APART = 350.0  # mm between two ends
 ROUND = 320.0  # mm around an end, the top of a head or a hand, that are looked at: a head is 250 high
 HEAD = 350.0  # mm around the middle of a face that are kept: all of the head, and shoulders
 FEW = 300  # triangles: an end with fewer is a speck
+PATCH = 5000.0  # mm²: a piece with less is a shred, as of the edges of a board, and no face: a third of one has 8,000
 #: Area of the surface against the square of its width, above which nothing is a body: people of 1.75 m and 75 kg have 1.9 m² of
 #: skin (Du Bois and Du Bois 1916), .6.
 THIN = 0.8
@@ -72,16 +73,17 @@ def head_of_body(mesh: Mesh, reference: Head, space: ShapeSpace, template, scale
 def parts_of(mesh: Mesh, scale: float) -> list[tuple[Mesh, Mesh]]:
     """Parts of ``mesh``, with so many mm per unit, in which a head may be, likeliest first, after what each is a part of.
 
-    Without walls these are the ends of a body; else the pieces that are left without them: as they are, where they are of the
-    size of a head or a bust, and one after the other the ends of those that are larger.
+    These are the pieces that it falls into without walls, as they are, where they are of the size of a head or a bust, and of
+    those that are larger the ends, one of each piece after the other; at last those of all of it, which may be in shreds.
     """
-    walls, ranked = in_walls(mesh, scale), []
-    for k, piece in enumerate(pieces(without(mesh, walls), FEW) if walls.any() else [mesh]):
+    rest, ranked = without(mesh, in_walls(mesh, scale)), []
+    apart = pieces(rest, FEW)[:PIECES]
+    for k, piece in enumerate([*apart, rest] if len(apart) > 1 else apart):
         across = _extent(piece) * scale
         if is_body(across):
             places = ends(surface_samples(piece) * scale) / scale
             ranked += [(j, k, piece, around(piece, place, ROUND / scale)) for j, place in enumerate(places)]
-        elif PLAUSIBLE[0] <= across <= BODY:
+        elif piece is not rest and PLAUSIBLE[0] <= across <= BODY and _area(piece) * scale**2 > PATCH:
             ranked.append((0, k, piece, piece))
     ranked.sort(key=lambda t: t[:2])
     return [(piece, part) for *_, piece, part in ranked if len(part.faces) >= FEW][:PARTS]
@@ -117,7 +119,11 @@ def around(mesh: Mesh, place, reach: float) -> Mesh:
 def _is_thin(mesh: Mesh) -> bool:
     """Whether the mesh is not too bulky for somebody's body."""
     width = 2 * _away(thinned(surface_samples(mesh), FINE)).max()
-    return vertex_areas(mesh.vertices, mesh.triangles).sum() <= THIN * width**2
+    return _area(mesh) <= THIN * width**2
+
+
+def _area(mesh: Mesh) -> float:
+    return float(vertex_areas(mesh.vertices, mesh.triangles).sum())
 
 
 def _extent(mesh: Mesh) -> float:
