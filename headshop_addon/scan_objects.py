@@ -18,7 +18,7 @@ from ..sim.errors import InputError
 from ..sim.landmarks.find import FoundLandmarks
 from ..sim.progress import Work, finish
 from ..sim.scan.joined import joined
-from ..sim.scan.orientation import Orientation, axis_names, detect
+from ..sim.scan.orientation import FOUND, Orientation, axis_names, detect, read_as
 from ..sim.scan.units import BY_FACE, UNITS, USUAL, unit_words
 from . import active, bridge, heads, pipeline, scan_landmarks
 from .scan_texture import with_pictures
@@ -93,9 +93,7 @@ def usual_scales(scan: bpy.types.Object) -> list[float]:
 def resize(scan: bpy.types.Object, factor: float) -> str:
     """Make the ``scan``, which is of no known unit, ``factor`` times as large, with the landmarks on it; returns why, in a few
     words."""
-    scan.data.transform(Matrix.Scale(factor, 4))
-    for item in scan_landmarks.entries(scan).values():
-        item.co, item.found = factor * Vector(item.co), factor * Vector(item.found)
+    _transform(scan, Matrix.Scale(factor, 4))
     facts = heads.read_report(scan).get("scan", {})
     scale = factor * facts.get("unit_scale", 1.0)
     name = next((name for name, usual in UNITS.items() if abs(scale / usual - 1) < ROUNDED), BY_FACE)
@@ -118,19 +116,23 @@ def stand_upright(scan: bpy.types.Object, found: FoundLandmarks) -> FoundLandmar
     turn = detect(bridge.object_to_mesh(scan), found.positions, unit=1.0).rotation
     if np.allclose(turn, np.eye(3)):
         return found
-    matrix = Matrix(turn.tolist())
-    scan.data.transform(matrix.to_4x4())
-    for item in scan_landmarks.entries(scan).values():
-        item.co, item.found = matrix @ Vector(item.co), matrix @ Vector(item.found)
+    matrix = Matrix(turn.tolist()).to_4x4()
+    _transform(scan, matrix)
     if scan.get(IN_PLACE):
-        scan.matrix_world = scan.matrix_world @ matrix.to_4x4().inverted()
+        scan.matrix_world = scan.matrix_world @ matrix.inverted()
     whole = turn @ _rotation(scan)
     scan[TURN] = whole.ravel().tolist()
     up, front = axis_names(whole)
-    said = f"Read as {unit_words(facts['unit'], facts['unit_scale'])}, {up} up, face toward {front}"
-    said += ": the landmarks that were found say so."
+    said = f"{read_as(facts['unit'], facts['unit_scale'], whole)}: {FOUND} say so."
     heads.write_report(scan, {"scan": facts | {"up": up, "front": front, "certain": True, "orientation": said}})
     return found.placed({name: turn @ place for name, place in found.positions.items()})
+
+
+def _transform(scan, matrix) -> None:
+    """Move the mesh of the ``scan`` and the landmarks on it by a ``matrix`` in its own space."""
+    scan.data.transform(matrix)
+    for item in scan_landmarks.entries(scan).values():
+        item.co, item.found = matrix @ Vector(item.co), matrix @ Vector(item.found)
 
 
 def _clear_view(context, obj) -> None:

@@ -227,6 +227,17 @@ def test_the_ends_of_two_people_are_looked_at_in_turn(body):
     assert all(abs(place[1]) < 100 for place in seen)
 
 
+def test_a_head_in_shreds_before_a_wall_is_looked_at_as_a_whole_too(reference):
+    skin, low = reference.skin, reference.skin.vertices.min(axis=0)
+    triangles, middle = skin.triangles, skin.vertices[skin.triangles].mean(axis=1)
+    halves = [triangles[middle[:, 0] < -1], triangles[middle[:, 0] > 1] + len(skin.vertices)]
+    behind, more = wall(low + [-400, 500, -300], (1100, 0, 0), (0, 0, 1000))
+    points = np.concatenate([skin.vertices, skin.vertices, behind])
+    scan = Mesh.from_triangles(points, np.concatenate([*halves, more + 2 * len(skin.vertices)]))
+    parts = parts_of(scan, 1.0)
+    assert max(len(part.faces) for _, part in parts) >= len(halves[0]) + len(halves[1]) - 50
+
+
 def test_a_speck_is_no_end(body):
     far = body.vertices.max(axis=0) + 600
     speck = Mesh.from_triangles([*body.vertices, far, far + [9, 0, 0], far + [0, 9, 0]], body.triangles)

@@ -12,7 +12,7 @@ from ..mesh import Mesh, vertex_areas
 from ..progress import Progress, Work, portion
 from ..scan.face_match import FINE, surface_samples, thinned
 from ..scan.scenery import in_walls, only, pieces, without
-from ..scan.units import BODY, PLAUSIBLE, USUAL, is_body, is_scene
+from ..scan.units import PLAUSIBLE, USUAL, is_body, is_scene
 from .looking import looked
 from .looks import ANY_SIZE, PLAIN, WHOLE
 from .pose_search import LOOKING
@@ -83,7 +83,7 @@ def parts_of(mesh: Mesh, scale: float) -> list[tuple[Mesh, Mesh]]:
         if is_body(across):
             places = ends(surface_samples(piece) * scale) / scale
             ranked += [(j, k, piece, around(piece, place, ROUND / scale)) for j, place in enumerate(places)]
-        elif piece is not rest and PLAUSIBLE[0] <= across <= BODY and _area(piece) * scale**2 > PATCH:
+        elif PLAUSIBLE[0] <= across <= PLAUSIBLE[1] and _area(piece) * scale**2 > PATCH:
             ranked.append((0, k, piece, piece))
     ranked.sort(key=lambda t: t[:2])
     return [(piece, part) for *_, piece, part in ranked if len(part.faces) >= FEW][:PARTS]

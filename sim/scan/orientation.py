@@ -24,6 +24,7 @@ from .units import (
     units_of,
 )
 
+FOUND = "the landmarks that were found"
 LOOKING = "Finding out which way is up"
 AXES = {sign + name: s * np.eye(3)[k] for k, name in enumerate("XYZ") for sign, s in (("+", 1.0), ("-", -1.0))}
 
@@ -196,6 +197,11 @@ def axis_names(rotation: np.ndarray) -> tuple[str, str]:
     return name(rotation[2]), name(-rotation[1])
 
 
+def read_as(name: str, scale: float, rotation: np.ndarray) -> str:
+    """How a scan was read, in words: its unit, and which of its axes are which."""
+    return "Read as {}, {} up, face toward {}".format(unit_words(name, scale), *axis_names(rotation))
+
+
 def _axis(text: str | None) -> str | None:
     if text is None:
         return None
@@ -231,8 +237,8 @@ def _by_landmarks(turn, allowed, name, scale, picked):
     tilt = np.degrees(np.arccos(np.clip((np.trace(rotation.T @ turn) - 1) / 2, -1, 1)))
     up, front = axis_names(rotation)
     certain = bool(tilt < 35)
-    reason = f"Read as {unit_words(name, scale)}, {up} up, face toward {front}"
-    marks = "the landmarks" if picked else "the landmarks that were found"
+    reason = read_as(name, scale, rotation)
+    marks = "the landmarks" if picked else FOUND
     if certain:
         reason += f": {marks} say so"
     else:
