@@ -57,12 +57,16 @@ def mesh_to_object(mesh: Mesh, name: str, groups: dict[str, np.ndarray] | None =
 def object_to_mesh(obj: bpy.types.Object, basis: bool = True) -> Mesh:
     """The object's own mesh without modifiers, in its local space, mm; n-gons are fanned into triangles.
 
-    ``basis`` reads the first shape key where there are any; otherwise the mesh's own positions are read.
+    ``basis`` reads the first shape key where there are any; otherwise the mesh's own positions are read. A point cloud object
+    gives a mesh without faces.
 
     Raises
     ------
-    InputError : the object is not a mesh.
+    InputError : the object is neither.
     """
+    if obj.type == "POINTCLOUD":
+        points = _get(obj.data.attributes["position"].data, "vector", 3).astype(float) / METRES
+        return Mesh(points, np.zeros((0, 4), np.int32), colour=read_colour(obj.data))
     if obj.type != "MESH":
         raise InputError(f"{obj.name} is a {obj.type.lower()} object, not a mesh: choose a mesh object.")
     vertices = read_positions(obj) if basis else _get(obj.data.vertices, "co", 3).astype(float) / METRES
@@ -212,11 +216,12 @@ def write_colour(data: bpy.types.Mesh, colour: np.ndarray, name: str = "Color") 
     _set(attribute.data, "color_srgb", rgba)
 
 
-def read_colour(data: bpy.types.Mesh, name: str | None = None) -> np.ndarray | None:
+def read_colour(data: bpy.types.Mesh | bpy.types.PointCloud, name: str | None = None) -> np.ndarray | None:
     """(n, 3) float32 sRGB of the named or the active colour attribute, or None; corner colours are averaged."""
-    attribute = data.color_attributes.get(name) if name else data.color_attributes.active_color
-    if attribute is None and not name and len(data.color_attributes):
-        attribute = data.color_attributes[0]
+    colours = data.color_attributes
+    attribute = colours.get(name) if name else getattr(colours, "active_color", None)  # none is active of a point cloud
+    if attribute is None and not name and len(colours):
+        attribute = colours[0]
     if attribute is None or not len(attribute.data):
         return None
     rgb = _get(attribute.data, "color_srgb", 4)[:, :3]

@@ -47,7 +47,11 @@ def parser() -> argparse.ArgumentParser:
     chosen.add_argument("head", metavar="HEAD.blend", help="a file that headshop build or the add-on made")
     chosen.add_argument("--head", dest="name", metavar="NAME", help="which head, if the file holds several")
     reading = argparse.ArgumentParser(add_help=False)
-    reading.add_argument("scan", metavar="SCAN", help="PLY, OBJ, STL, glTF, USD, FBX, or a range map (ECH, NPZ, JSON)")
+    reading.add_argument(
+        "scan",
+        metavar="SCAN",
+        help="PLY, OBJ, STL, glTF, USD, FBX, a range map (ECH, NPZ, JSON), or points (PLY, PCD, XYZ, PTS, CSV)",
+    )
     about = "the scan's unit: mm, cm, m, in, or millimetres per unit as a number (default: detected)"
     reading.add_argument("--units", type=_unit, metavar="UNIT", help=about)
     up = "the scan's up axis: X, Y, Z or, written --up=-Z, one upside down (default: detected)"

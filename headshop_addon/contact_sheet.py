@@ -83,7 +83,9 @@ def anatomy_tiles(skin: bpy.types.Object) -> list[Tile]:
     scan, fit, muscles = heads.scan_of(skin), report.get("fit", {}), heads.muscles_of(skin)
     tiles = []
     if scan is not None:
-        tiles.append(Tile("Scan", f"{len(scan.data.polygons):,} triangles, as it came", ("scan",)))
+        points = report.get("scan", {}).get("points")
+        came = f"made of {points:,} points" if points else f"{len(scan.data.polygons):,} triangles, as it came"
+        tiles.append(Tile("Scan", came, ("scan",)))
     near = f"{fit['mean_mm']:.2f} mm from the scan on average" if "mean_mm" in fit else "ready to act"
     tiles.append(Tile("Head", near, ("skin", "features")))
     if muscles:

@@ -17,6 +17,9 @@ from ..sim.cylindrical.map_files import EXTENSIONS as MAPS
 from ..sim.cylindrical.map_files import is_range_map, read_range_map
 from ..sim.errors import InputError
 from ..sim.mesh import Mesh
+from ..sim.point_cloud.pcd_files import read_pcd
+from ..sim.point_cloud.text_files import EXTENSIONS as POINTS
+from ..sim.point_cloud.text_files import read_points
 from ..sim.scan.joined import joined
 from ..sim.scan.ply import read_textured_ply
 from ..sim.scan.whole_files import require_whole
@@ -61,7 +64,8 @@ _IMPORTERS = {
 }
 #: Blender's axes back to the file's, where they are known to differ: glTF is Y up.
 _FILE_AXES = dict.fromkeys((".glb", ".gltf"), np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]]))
-EXTENSIONS = (".ply", *_IMPORTERS, *MAPS)
+_READERS = {".pcd": read_pcd, **dict.fromkeys(POINTS, read_points)}
+EXTENSIONS = (".ply", *_IMPORTERS, *MAPS, *_READERS)
 
 
 def check_file(path) -> Path:
@@ -87,11 +91,12 @@ def check_file(path) -> Path:
 def read_scan(path) -> Mesh:
     """All meshes of a scan file as one, in the file's own units and axes (USD and FBX: in metres, Z up).
 
-    A range map becomes the mesh of its texels in mm, Z up, its voids and jumps as holes (`sim.cylindrical`).
+    A range map becomes the mesh of its texels in mm, Z up, its voids and jumps as holes (`sim.cylindrical`); points without
+    faces stay so (`sim.point_cloud`).
 
     Raises
     ------
-    InputError : missing, empty, truncated, of an unknown kind, not what its name says, or without faces.
+    InputError : missing, empty, truncated, of an unknown kind, not what its name says, or without points.
     """
     path = check_file(path)
     extension = path.suffix.lower()
@@ -99,6 +104,8 @@ def read_scan(path) -> Mesh:
         return _read_ply(path)
     if is_range_map(path):
         return to_mesh(read_range_map(path))
+    if extension in _READERS:
+        return _READERS[extension](path)
     require_whole(path)
     with _scratch_scene() as scene:
         with quiet() as printed:
@@ -161,14 +168,15 @@ def datablocks() -> set:
 
 
 def _meshes_of(scene) -> list[Mesh]:
-    """Every mesh object of the scene with its transforms applied, in Blender's units as they are."""
+    """Every mesh object of the scene with its transforms applied, in Blender's units as they are: those with faces, or if
+    there are none, those of points alone."""
     graph = scene.view_layers[0].depsgraph
     graph.update()
     meshes = []
-    for obj in scene.objects:
-        if obj.type == "MESH" and len(obj.data.polygons):
-            mesh = with_pictures(bridge.object_to_mesh(obj), obj)
-            matrix = np.array(obj.evaluated_get(graph).matrix_world)
-            points = mesh.vertices * bridge.METRES
-            meshes.append(mesh.moved(points @ matrix[:3, :3].T + matrix[:3, 3]))
+    objects = [obj for obj in scene.objects if obj.type == "MESH" and len(obj.data.vertices)]
+    for obj in [obj for obj in objects if len(obj.data.polygons)] or objects:
+        mesh = with_pictures(bridge.object_to_mesh(obj), obj)
+        matrix = np.array(obj.evaluated_get(graph).matrix_world)
+        points = mesh.vertices * bridge.METRES
+        meshes.append(mesh.moved(points @ matrix[:3, :3].T + matrix[:3, 3]))
     return meshes

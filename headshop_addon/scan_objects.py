@@ -50,7 +50,7 @@ def add_sample(context, sample, with_landmarks: bool = True) -> bpy.types.Object
 
 
 def adopt(context, original: bpy.types.Object) -> Work:
-    """Work that makes a clean, upright copy of a mesh object the scan, in the original's place, and hides the original;
+    """Work that makes a clean, upright copy of a mesh or point cloud object the scan, in the original's place, and hides that;
     returns the copy.
 
     Raises
@@ -178,7 +178,8 @@ def look_at(context) -> None:
 def summary(scan: bpy.types.Object) -> str:
     """A sentence about a scan that came in."""
     report = json.loads(scan.get(heads.REPORT, "{}")).get("scan", {})
-    return f"{scan.name}: {len(scan.data.polygons):,} faces. {report.get('orientation', '')}".strip()
+    made = f", made of {report['points']:,} points" if report.get("points") else ""
+    return f"{scan.name}: {len(scan.data.polygons):,} faces{made}. {report.get('orientation', '')}".strip()
 
 
 def _rotation(scan) -> np.ndarray:

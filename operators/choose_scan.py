@@ -8,7 +8,7 @@ from ..headshop_addon.jobs import Job
 
 
 class HEADSHOP_OT_choose_scan(Job, bpy.types.Operator):
-    """Take a cleaned, upright copy of the active mesh object as the scan, in the same place"""
+    """Take a cleaned, upright copy of the active mesh or point cloud as the scan, in the same place"""
 
     bl_idname = "headshop.choose_scan"
     bl_label = "Use Active Object"
@@ -17,10 +17,10 @@ class HEADSHOP_OT_choose_scan(Job, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        """Needs a mesh object that is no part of a head."""
+        """Needs a mesh or point cloud object that is no part of a head."""
         obj = context.active_object
-        if obj is None or obj.type != "MESH" or heads.PART in obj:
-            cls.poll_message_set("Select a mesh object that is neither a scan nor part of a head")
+        if obj is None or obj.type not in ("MESH", "POINTCLOUD") or heads.PART in obj:
+            cls.poll_message_set("Select a mesh or point cloud object that is neither a scan nor part of a head")
             return False
         return polls.library(cls, "scipy") and polls.object_mode(cls, context)
 

@@ -25,7 +25,7 @@ UP = (
 
 
 class HEADSHOP_OT_import_scan(FileJob, ImportHelper, bpy.types.Operator):
-    """Read a head scan (PLY, OBJ, STL, glTF, USD, FBX or a range map), clean it and set it upright in real size"""
+    """Read a head scan (PLY, OBJ, STL, glTF, USD, FBX, a range map or points), clean it and set it upright in real size"""
 
     bl_idname = "headshop.import_scan"
     bl_label = "Import Scan"
@@ -34,7 +34,8 @@ class HEADSHOP_OT_import_scan(FileJob, ImportHelper, bpy.types.Operator):
 
     filename_ext = ""
     filter_glob: bpy.props.StringProperty(
-        default="*.ply;*.obj;*.stl;*.glb;*.gltf;*.usd;*.usda;*.usdc;*.usdz;*.fbx;*.ech;*.echo;*.cyb;*.cyber;*.npz;*.json",
+        default="*.ply;*.obj;*.stl;*.glb;*.gltf;*.usd;*.usda;*.usdc;*.usdz;*.fbx;*.ech;*.echo;*.cyb;*.cyber;*.npz;*.json;"
+        "*.pcd;*.xyz;*.xyzrgb;*.xyzn;*.pts;*.asc;*.csv;*.txt",
         options={"HIDDEN"},
     )
     unit: bpy.props.EnumProperty(name="Unit", description="Unit of length in the file", items=UNITS)

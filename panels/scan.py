@@ -45,6 +45,8 @@ def _facts(layout, context, scan):
     column.scale_y = 0.85
     size = max(scan.dimensions) * 1000
     column.label(text=f"{len(scan.data.polygons):,} faces, {size:.0f} mm", icon="MESH_DATA")
+    if facts.get("points"):
+        column.label(text=f"Made of {facts['points']:,} points", icon="OUTLINER_OB_POINTCLOUD")
     if "unit" in facts:
         unit, axes = facts["unit"], f"{facts['up']} up, facing {facts['front']}"
         usual = unit in UNITS

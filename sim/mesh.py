@@ -18,6 +18,7 @@ class Mesh:
     material : (m,) int16 or None, index into the part's material names (`headshop.sim.anatomy.head.MATERIALS`), or into
         the ``pictures`` of a scan
     colour : (n, 3) float32 or None, sRGB colour per vertex, 0..1 (scans)
+    normals : (n, 3) float32 or None, which way the surface faces at points that have no faces (scans)
     pictures : (h, w, 3) uint8 each, sRGB, first row at the bottom: what faces of that material show; None: nothing (scans)
     """
 
@@ -26,6 +27,7 @@ class Mesh:
     uv: np.ndarray | None = None
     material: np.ndarray | None = None
     colour: np.ndarray | None = None
+    normals: np.ndarray | None = None
     pictures: tuple[np.ndarray | None, ...] = ()
 
     @classmethod

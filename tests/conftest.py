@@ -163,7 +163,7 @@ def one_look(monkeypatch):
 
 @pytest.fixture
 def bad_scan(tmp_path):
-    """``bad_scan(kind)`` -> path of a file: empty, text, missing, truncated, points, nan, one_triangle, whole."""
+    """``bad_scan(kind)`` -> path of a file: empty, text, missing, truncated, nothing, points, nan, one_triangle, whole."""
     import numpy as np
 
     from headshop.sim.mesh import Mesh
@@ -182,7 +182,10 @@ def bad_scan(tmp_path):
             faces = np.stack([corner[:-1, :-1], corner[:-1, 1:], corner[1:, 1:], corner[1:, :-1]], axis=-1)
             points, faces = points.reshape(-1, 3), faces.reshape(-1, 4)
             points = points * np.nan if kind == "nan" else points
-            faces = {"points": faces[:0], "one_triangle": np.array([[0, 1, 20, -1]])}.get(kind, faces)
+            points = points[:0] if kind == "nothing" else points
+            faces = {"nothing": faces[:0], "points": faces[:0], "one_triangle": np.array([[0, 1, 20, -1]])}.get(
+                kind, faces
+            )
             write_ply(path, Mesh(points, faces.astype(np.int32)))
             if kind == "truncated":
                 path.write_bytes(path.read_bytes()[:-1000])

@@ -66,6 +66,7 @@ def test_each_fault_is_removed_and_counted():
     colour[n + 3] = 0.75
     mesh, counts = clean_scan(Mesh.from_triangles(vertices, faces, colour=colour))
     assert counts == {
+        "points": 0,
         "nonfinite_vertices": 2,
         "nonfinite_faces": 1,
         "welded_vertices": 1,
@@ -141,7 +142,8 @@ def test_quads_are_taken_apart():
     ("change", "says"),
     [
         (lambda p, t: (p[:0], t[:0]), "no vertices"),
-        (lambda p, t: (p, t[:0]), "no faces"),
+        (lambda p, t: (p[:5], t[:0]), "no faces, and only 5 points"),
+        (lambda p, t: (p * np.nan, t[:0]), "no faces, and only 0 points"),
         (lambda p, t: (p, t[:1]), "has 1 triangle, too few"),
         (lambda p, t: (p * np.nan, t), "all are NaN"),
         (lambda p, t: (p * 0, t), "no head in any unit"),

@@ -53,7 +53,7 @@ def test_polygons_become_fans_and_other_columns_are_passed_over(tmp_path):
         ("text", "not a PLY file"),
         ("missing", "cannot be read"),
         ("truncated", "truncated"),
-        ("points", "no faces"),
+        ("nothing", "neither faces nor points"),
     ],
 )
 def test_bad_files_get_one_sentence(bad_scan, kind, says):

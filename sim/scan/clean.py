@@ -9,7 +9,8 @@ from scipy.sparse.csgraph import connected_components
 
 from ..errors import InputError
 from ..mesh import Mesh, cross_sides
-from ..progress import Progress, Work, finish
+from ..point_cloud.meshed import meshing
+from ..progress import Progress, Work, finish, portion
 from .strays import stray_vertices
 from .texture import has_pictures, triangle_corners
 from .winding import wound_alike
@@ -31,23 +32,33 @@ def clean_scan(mesh: Mesh) -> tuple[Mesh, dict]:
 
 def cleaning(mesh: Mesh) -> Work:
     """Work returning a triangle mesh without NaN vertices, zero-area, duplicate faces and unused vertices; equal ones welded,
-    neighbours wound the same way round.
+    neighbours wound the same way round. Points without faces become a mesh first (`point_cloud.meshing`).
 
     It returns the mesh (colours kept: the mean of those welded; pictures too) and counts: ``vertices``, ``triangles``,
-    ``components`` of the result, what was removed: ``nonfinite_vertices``, ``nonfinite_faces``, ``welded_vertices``,
-    ``stray_vertices`` with the faces at them, ``zero_area_faces``, ``duplicate_faces``, ``unused_vertices``, and the
-    ``turned_faces``.
+    ``components`` of the result, ``points`` that it was made of (0: it had faces), what was removed: ``nonfinite_vertices``,
+    ``nonfinite_faces``, ``welded_vertices``, ``stray_vertices`` with the faces at them, ``zero_area_faces``,
+    ``duplicate_faces``, ``unused_vertices``, and the ``turned_faces``.
 
     Raises
     ------
-    InputError : nothing usable is there: no faces, too few, too many, all NaN, all in one point or plane,
+    InputError : nothing usable is there: no points, too few of them or of faces, too many, all NaN, all in one point or plane,
     too far from the origin.
     """
+    counts = {"points": 0}
+    if len(mesh.vertices) and not len(mesh.faces):
+        counts["points"] = len(mesh.vertices)
+        mesh = yield from portion(meshing(mesh), 0.0, 0.9)
+        yield Progress(0.9, "Cleaning the scan")
+        return (yield from portion(_cleaning(mesh, counts), 0.9, 1.0))
+    return (yield from _cleaning(mesh, counts))
+
+
+def _cleaning(mesh, counts):
+    """`cleaning` of a mesh with faces, adding to ``counts``."""
     yield Progress(0.0, "Cleaning the scan")
     points, triangles = mesh.vertices, mesh.triangles
     rows = np.arange(len(triangles))
     _refuse_hopeless(points, triangles)
-    counts = {}
     finite = np.isfinite(points).all(axis=1)
     counts["nonfinite_vertices"] = int((~finite).sum())
     if not finite.any():
@@ -131,10 +142,6 @@ def components(triangles: np.ndarray, vertex_count: int) -> tuple[int, np.ndarra
 def _refuse_hopeless(points, triangles):
     if len(points) == 0:
         raise InputError("The scan has no vertices: choose another file, or export it again.")
-    if len(triangles) == 0:
-        raise InputError(
-            f"The scan has {len(points)} points but no faces: make a mesh of the points (the scanner's software can)."
-        )
     if len(triangles) < FEWEST_TRIANGLES:
         raise InputError(
             f"The scan has {len(triangles)} triangle{'s' if len(triangles) > 1 else ''}, too few for a head: choose "

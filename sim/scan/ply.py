@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Read and write polygon meshes as PLY (Turk 1994), ASCII and binary of both byte orders, in plain numpy.
+"""Read and write polygon meshes, and read points, as PLY (Turk 1994), ASCII and binary of both byte orders, in plain numpy.
 
 Blender's importers read the artist's scans; this serves exports, tests and everyone without Blender.
 """
@@ -17,17 +17,19 @@ from .ply_header import read_header
 from .ply_texture import corner_places
 
 FORMATS = ("binary_little_endian", "binary_big_endian", "ascii")
+_NORMAL = ("nx", "ny", "nz")
 _FACE_LISTS = ("vertex_indices", "vertex_index")
 
 
 def read_ply(path) -> Mesh:
     """The mesh in a PLY file without its pictures; polygons of more than four corners become fans of triangles.
 
-    Positions are returned as they stand in the file, in its own unit. ``colour`` is (n, 3) float32 in 0..1 or None.
+    Positions are returned as they stand in the file, in its own unit. ``colour`` is (n, 3) float32 in 0..1 or None. A file
+    without faces gives a mesh without faces, and the ``normals`` of its points if it has them (`sim.point_cloud`).
 
     Raises
     ------
-    InputError : the file is missing, empty, not PLY, truncated, without faces, or its counts or indices are absurd.
+    InputError : the file is missing, empty, not PLY, truncated, without points, or its counts or indices are absurd.
     """
     return replace(read_textured_ply(path)[0], uv=None, material=None)
 
@@ -58,12 +60,10 @@ def read_textured_ply(path) -> tuple[Mesh, tuple[str, ...]]:
     vertices, colour = _vertices(of_vertices, path)
     of_faces = columns.get("face", {})
     lists = [of_faces[name] for name in _FACE_LISTS if isinstance(of_faces.get(name), tuple)]
-    if not lists or not len(lists[0][0]):
-        raise _no_faces(path, len(vertices))
-    counts, flat = lists[0]
+    counts, flat = lists[0] if lists else (np.zeros(0, np.int64), np.zeros(0, np.int64))
     corners, polygon = _corners(counts)
     if not len(corners):
-        raise _no_faces(path, len(vertices))
+        return _points(path, vertices, colour, of_vertices), ()
     named = np.append(np.clip(flat.astype(np.int64), -(2**31), 2**31 - 1), -1)  # the last is for the corner of none
     faces = named[corners].astype(np.int32)
     if faces.min() < -1 or named[corners[corners >= 0]].min() < 0 or faces.max() >= len(vertices):
@@ -149,7 +149,11 @@ def _corners(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.concatenate([out, fan]), np.concatenate([small, fans])
 
 
-def _no_faces(path, points: int) -> InputError:
-    return InputError(
-        f"{path} has {points} points but no faces: make a mesh of the points (the scanner's software can) and export that."
-    )
+def _points(path, vertices, colour, columns) -> Mesh:
+    """Points without faces, with their normals."""
+    if not len(vertices):
+        raise InputError(f"{path} has neither faces nor points: export the scan again.")
+    normals = None
+    if all(name in columns for name in _NORMAL):
+        normals = np.stack([np.asarray(columns[name], dtype=np.float32) for name in _NORMAL], axis=1)
+    return Mesh(vertices, np.zeros((0, 4), np.int32), colour=colour, normals=normals)

@@ -1,0 +1,157 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A mesh of the surface that points without faces were measured on; where they saw nothing it has holes."""
+
+import numpy as np
+
+from ..errors import InputError
+from ..mesh import Mesh, edges
+from ..progress import Progress, Work, finish, portion
+from .facing import outward
+from .neighbourhoods import CLOSE, batches, discs, nearest, planes, spacing, specks, thinned
+from .sphere_fit import Spheres
+from .surface_nets import Grid
+
+#: Fewer points than this show no face, more would not fit the memory of an ordinary machine.
+FEWEST, MOST = 1000, 100_000_000
+#: A cell of the grid is as wide as so many spacings of the points, or wider, so that about so many cells lie on the surface:
+#: up to a width at which it still shows what they do, and from there on, so that no more than these do.
+WIDTH, CELLS = 0.7, 300_000
+WIDEST, MOST_CELLS = 1.2, 1_000_000
+#: Points that tell the spacing of all, and the nearest of each that tell its plane.
+TELLING = 20_000
+IN_PLANE = 12
+#: Points that lie off their plane by more than this part of their spacing are noise; cells get so many times as wide then.
+THICK = 0.3
+WIDER = 1.3
+#: Points farther than this from the middle of all, times as far as nine tenths are, are none of it.
+STRAY = 10.0
+#: A sphere is right near its points alone. Farther from the plane of the nearest than this part of a cell, that plane tells
+#: the side; and a cell is looked at if that may pass it.
+NEAR = 0.5
+#: The surface ends so many spacings beyond the last point, and gaps of as many cells on either side are none.
+BEYOND = 1.0
+GAP = 3
+#: A vertex that has to be moved farther than this many cells is of no surface, but lies midway between two.
+MOVED = 1.5
+#: Normals that are given are of use if so many of the nearest agree with each; some programs leave their signs to chance.
+AGREE = 0.95
+LABEL = "Making a mesh of the points"
+
+
+def meshed(cloud: Mesh) -> Mesh:
+    """`meshing`, at once."""
+    return finish(meshing(cloud))
+
+
+def meshing(cloud: Mesh) -> Work:
+    """Work returning the mesh of a ``cloud``, a mesh without faces, in any unit; with the colours that its points have.
+
+    Its ``normals`` tell which side is out if it has any and they agree. Points are averaged where they are closer than is of
+    use, and where they are noisy; specks of a few are left out.
+
+    Raises
+    ------
+    InputError : there are too few points, or too many, or all lie in one place.
+    """
+    yield Progress(0.0, LABEL)
+    points, values = _usable(cloud)
+    distance = nearest(points, CLOSE, points[:: 1 + len(points) // TELLING])[0]
+    apart = spacing(distance)
+    cell = _cell(apart, len(points))
+    yield Progress(0.05, LABEL)
+    all_points, all_values = points, values
+    while True:
+        points, values = thinned(all_points, cell / 2, all_values)
+        _refuse_few(points)
+        distance, near = nearest(points, IN_PLANE)
+        facing, off = planes(points, near)
+        apart = spacing(distance)
+        if np.median(off / apart) < THICK:
+            break
+        cell *= WIDER
+        yield Progress(0.1, LABEL)
+    yield Progress(0.2, LABEL)
+    kept = ~specks(apart, distance[:, 1:], near[:, 1:])
+    points, values, apart = points[kept], values[kept], apart[kept]
+    _refuse_few(points)
+    near = nearest(points, IN_PLANE)[1]
+    facing = planes(points, near)[0]
+    told = None if cloud.normals is None else _as_told(facing, values[:, -3:], near)
+    facing = outward(points, facing, near) if told is None else told
+    yield Progress(0.35, LABEL)
+    surface = Spheres(points, facing, apart, values)
+    return (yield from portion(_drawn(surface, cell, cloud.colour is not None), 0.35, 1.0))
+
+
+def _usable(cloud):
+    """Points (n, 3) and what is known of them (n, 0, 3 or 6), colours before normals; without strays, and those without a
+    place."""
+    points = cloud.vertices
+    known = [table for table in (cloud.colour, cloud.normals) if table is not None]
+    values = np.concatenate([np.zeros((len(points), 0)), *known], axis=1)
+    if len(points) > MOST:
+        raise InputError(f"The scan has {len(points)} points, more than memory allows: reduce it to {MOST} or fewer.")
+    usable = np.isfinite(points).all(axis=1) & np.isfinite(values).all(axis=1)
+    _refuse_few(points[usable])
+    from_middle = np.abs(points - np.median(points[usable], axis=0)).max(axis=1)
+    with np.errstate(invalid="ignore"):
+        usable &= from_middle <= STRAY * np.quantile(from_middle[usable], 0.9)
+    points, first = np.unique(points[usable], axis=0, return_index=True)
+    _refuse_few(points)
+    return points, values[usable][first]
+
+
+def _cell(apart, count):
+    """How wide the cells are for ``count`` points, some of which are ``apart`` (n,) from each other."""
+    spacing, area = np.median(apart), np.mean(apart**2) * count
+    return max(WIDTH * spacing, min(WIDEST * spacing, np.sqrt(area / CELLS)), np.sqrt(area / MOST_CELLS))
+
+
+def _refuse_few(points):
+    if len(points) < FEWEST:
+        raise InputError(
+            f"The scan has no faces, and only {len(points)} points that tell a surface, too few for a head: choose another "
+            "file, or make a mesh of it (the scanner's software can)."
+        )
+
+
+def _as_told(facing, normals, near):
+    """``facing`` (n, 3) on the side of ``normals`` (n, 3), or None if those of ``near`` (n, k) points do not agree."""
+    turned = np.where(np.einsum("ij,ij->i", facing, normals)[:, None] < 0, -facing, facing)
+    agree = np.einsum("nki,ni->nk", normals[near[:, 1:]], normals) > 0
+    return turned if agree.mean() > AGREE else None
+
+
+def _drawn(surface: Spheres, cell: float, coloured: bool) -> Work:
+    """Work returning the mesh of ``surface`` in cells of this size, and the first three of its values as colours."""
+    grid = Grid(discs(surface.points, surface.normals, 2 * surface.apart, cell), cell)
+    yield Progress(0.1, LABEL)
+    side = surface.about(grid.corner)
+    of_cells = side[grid.at]
+    passed = (of_cells.min(axis=1) < NEAR * cell) & (of_cells.max(axis=1) > -NEAR * cell)
+    exact = np.unique(grid.at[passed])
+    for rows in batches(len(exact)):
+        yield Progress(0.2 + 0.5 * rows.start / len(exact), LABEL)
+        corner = exact[rows]
+        fitted = surface.outside(grid.corner[corner])
+        flipped = (np.abs(side[corner]) > NEAR * cell) & (fitted * side[corner] < 0)
+        side[corner] = np.where(flipped, side[corner], fitted)
+    first, quads = grid.surface(side)
+    yield Progress(0.8, LABEL)
+    vertices = surface.onto(first)[0]
+    yield Progress(0.9, LABEL)
+    vertices, away, values = surface.onto(vertices)
+    seen = _closed(away < BEYOND, quads) & (np.linalg.norm(vertices - first, axis=1) < MOVED * cell)
+    used, quads = np.unique(quads[seen[quads].all(axis=1)], return_inverse=True)
+    colour = values[used, :3].astype(np.float32) if coloured else None
+    return Mesh(vertices[used], quads.reshape(-1, 4).astype(np.int32), colour=colour)
+
+
+def _closed(seen, quads):
+    """(v,) bool: vertices that are ``seen``, and those in gaps of which no vertex is farther than `GAP` from seen ones."""
+    one, other = edges(quads).T
+    for wanted in (True,) * GAP + (False,) * GAP:
+        ends = (seen[one] == wanted) | (seen[other] == wanted)
+        seen = seen.copy()
+        seen[one[ends]] = seen[other[ends]] = wanted
+    return seen
