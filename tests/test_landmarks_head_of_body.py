@@ -8,6 +8,7 @@ import pytest
 
 from headshop.headshop_addon import pipeline
 from headshop.sim.adapt.scan_surface import near_head
+from headshop.sim.errors import InputError
 from headshop.sim.landmarks import head_of_body, placed_face
 from headshop.sim.landmarks.find import FoundLandmarks, find_landmarks
 from headshop.sim.landmarks.head_of_body import (
@@ -21,8 +22,10 @@ from headshop.sim.landmarks.head_of_body import (
     other_scales,
     parts_of,
 )
+from headshop.sim.landmarks.shape_space import shape_space
 from headshop.sim.landmarks.verdict import Verdict
 from headshop.sim.mesh import Mesh
+from headshop.sim.mesh_subdivision import smoother
 from headshop.sim.progress import Progress, finish
 from headshop.sim.scan.ply import write_ply
 from headshop.sim.scan.units import USUAL, plausible_units
@@ -127,6 +130,53 @@ def test_an_end_without_a_plain_face_is_passed_over(reference, body, monkeypatch
     far = np.linalg.norm(part.vertices, axis=1)
     head = np.linalg.norm(reference.skin.vertices[reference.groups["inner"] < 0.5], axis=1)
     assert far.max() < HEAD and (far > 150).sum() > 0.9 * ((head > 150) & (head < HEAD)).sum()  # all of the head there
+
+
+def test_a_bust_in_no_unit_is_none_but_as_bulky(reference, body, in_a_room):
+    """Looked at from its ends as somebody of two metres, it took three times as long."""
+    operator, quads = smoother(reference.skin.faces, len(reference.skin.vertices), 1)
+    head = Mesh(
+        operator @ reference.skin.vertices, quads
+    )  # no side of its triangles is 15 cm long at this size, as of walls
+    size = np.ptp(head.vertices, axis=0).max()
+    for metres in (1.2, 2.0, 2.5):
+        large = head.moved(head.vertices * metres / size)
+        assert head_of_body.may_be_bust(large, [1000.0])
+        assert not head_of_body.is_bust(large, 1000.0) and head_of_body.is_bust(large, size / metres)
+    assert not head_of_body.may_be_bust(head, [1.0])  # a head it is
+    assert not head_of_body.may_be_bust(head.moved(head.vertices * 8), [1.0, 0.1])  # in one of these units
+    assert not head_of_body.may_be_bust(head, [])
+    assert not head_of_body.may_be_bust(body, [1.0])
+    assert not head_of_body.may_be_bust(in_a_room[0], [1.0])
+
+
+def test_a_bust_in_no_unit_is_not_looked_at_as_a_body(reference, monkeypatch):
+    """It is seen in any size, at which it is no larger than a bust, and then in that."""
+    asked = []
+
+    def sized(mesh, reference, space, template, unit_scales, or_infant):
+        asked.append("any size")
+        yield Progress(0.5, "")
+        return answers[0], []
+
+    def of_body(mesh, reference, space, template, scales):
+        asked.append(list(scales))
+        yield Progress(0.5, "")
+        raise InputError("enough")
+
+    monkeypatch.setattr(placed_face, "face_of_any_size", sized)
+    monkeypatch.setattr(placed_face, "head_of_body", of_body)
+    head = reference.skin
+    large = head.moved(head.vertices * 2 / np.ptp(head.vertices, axis=0).max())
+    for answers in ((150.0, 150.0), (900.0, 1000.0), (None, 1000.0)):
+        asked.clear()
+        with pytest.raises(InputError, match="enough"):
+            finish(placed_face.place_face(large, reference, shape_space(reference), [1000.0], any_size=True))
+        assert asked == ["any size", [answers[1]]]
+    asked.clear()
+    with pytest.raises(InputError, match="enough"):
+        finish(placed_face.place_face(large, reference, shape_space(reference), [1000.0]))  # somebody said so
+    assert asked == [[1000.0]]
 
 
 def test_ends_are_what_sticks_out(body):

@@ -31,6 +31,10 @@ PATCH = 5000.0  # mm²: a piece with less is a shred, as of the edges of a board
 THIN = 0.8
 #: mm across, as which bodies in no usual unit are looked at: from head to foot, and from the head to the hips.
 STATURES = (1750.0, 1100.0)
+#: Of samples of a head, a face or a bust the least spread against the greatest; people's bodies have less than half of it.
+BULKY = 0.4
+#: Share of the area that is walls in a room. A head as large as a person is .05 to .56 of that where it is smooth.
+WALLED = 0.6
 SIMILAR = 1.2  # between two scales that are as good as one: a face is found if it is .72 to 1.22 of the reference
 
 
@@ -47,6 +51,23 @@ def other_scales(mesh: Mesh, known, usual=USUAL) -> list[float]:
     if _is_thin(mesh):
         scales += [stature / _extent(mesh) for stature in STATURES]
     return [scale for scale in scales if all(not 1 / SIMILAR < scale / other < SIMILAR for other in known)]
+
+
+def may_be_bust(mesh: Mesh, scales) -> bool:
+    """Whether the mesh may be a mere head or bust, in no usual unit, although it is more in all ``scales``, mm per unit: it is
+    as bulky as those are, and not most of it is walls."""
+    if not scales or not all(is_scene(_extent(mesh) * scale) for scale in scales):
+        return False
+    points = surface_samples(mesh)
+    spread = np.sqrt(np.linalg.eigvalsh(np.cov((points - points.mean(axis=0)).T)))
+    if spread[0] < BULKY * spread[2]:
+        return False
+    return all(_area(without(mesh, ~in_walls(mesh, scale))) < WALLED * _area(mesh) for scale in scales)
+
+
+def is_bust(mesh: Mesh, scale: float) -> bool:
+    """Whether the mesh is no larger than a head or a bust in so many mm per unit."""
+    return _extent(mesh) * scale <= PLAUSIBLE[1]
 
 
 def head_of_body(mesh: Mesh, reference: Head, space: ShapeSpace, template, scales) -> Work:

@@ -16,7 +16,7 @@ from ..scan.units import USUAL
 from .any_size import face_of_any_size, of_human_size, of_most, resized
 from .beards import above_beard, template_above
 from .confidence import like_ears
-from .head_of_body import body_scales, head_of_body, other_scales
+from .head_of_body import body_scales, head_of_body, is_bust, may_be_bust, other_scales
 from .infant import infant_points, infant_space
 from .looking import FITTING, SIZE, TRIAL_MODES, facing_out, lies, looked, run
 from .looks import LOOKS, ODDLY_SIZED, PARTS, PLAIN, QUICK, SIZED, THOROUGH, WHOLE
@@ -65,7 +65,15 @@ def place_face(
     def of_body(scales):
         return head_of_body(mesh, reference, grown, template, scales)
 
-    head = yield from portion(of_body(unit_scales), 0.0, 0.5)
+    def of_any_size():
+        return face_of_any_size(mesh, reference, grown, face_template(reference), known, or_infant)
+
+    sized = None
+    if any_size and may_be_bust(mesh, unit_scales):
+        sized = yield from portion(of_any_size(), 0.0, 0.3)
+        if sized[0] is not None and is_bust(mesh, sized[0]):
+            return (yield from portion(brought_to(sized[0]), 0.3, 1.0))
+    head = yield from portion(of_body(unit_scales), 0.3 if sized else 0.0, 0.5)
     if head is not None:
         return (yield from portion(_placed_on(head, reference, [*known, *usual]), 0.5, 1.0))
     for look, (low, middle, high) in zip(LOOKS, PARTS, strict=True):
@@ -90,8 +98,7 @@ def place_face(
             head = yield from portion(of_body([x for x in body_scales(mesh, usual) if x not in known]), middle, high)
             if head is not None:
                 return (yield from portion(_placed_on(head, reference, [*known, *usual]), high, 1.0))
-            work = face_of_any_size(mesh, reference, space, template, unit_scales, or_infant)
-            scale, closer = yield from portion(work, high, SIZED)
+            scale, closer = sized or (yield from portion(of_any_size(), high, SIZED))
             if scale is not None:
                 return (yield from portion(brought_to(scale), SIZED, 1.0))
             head = yield from portion(

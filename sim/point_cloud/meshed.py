@@ -7,22 +7,20 @@ from ..errors import InputError
 from ..mesh import Mesh, edges
 from ..progress import Progress, Work, finish, portion
 from .facing import outward
-from .neighbourhoods import CLOSE, batches, discs, nearest, planes, spacing, specks, thinned
+from .neighbourhoods import CLOSE, batches, discs, nearest, spacing, specks
 from .sphere_fit import Spheres
 from .surface_nets import Grid
+from .thinning import Settled, settling
 
 #: Fewer points than this show no face, more would not fit the memory of an ordinary machine.
 FEWEST, MOST = 1000, 100_000_000
 #: A cell of the grid is as wide as so many spacings of the points, or wider, so that about so many cells lie on the surface:
 #: up to a width at which it still shows what they do, and from there on, so that no more than these do.
-WIDTH, CELLS = 0.7, 300_000
+WIDTH, CELLS = 0.8, 150_000
 WIDEST, MOST_CELLS = 1.2, 1_000_000
-#: Points that tell the spacing of all, and the nearest of each that tell its plane.
+#: Points that tell the spacing of all. Some may be `FARTHER` spacings apart; more are outliers.
 TELLING = 20_000
-IN_PLANE = 12
-#: Points that lie off their plane by more than this part of their spacing are noise; cells get so many times as wide then.
-THICK = 0.3
-WIDER = 1.3
+FARTHER = 4.0
 #: Points farther than this from the middle of all, times as far as nine tenths are, are none of it.
 STRAY = 10.0
 #: A sphere is right near its points alone. Farther from the plane of the nearest than this part of a cell, that plane tells
@@ -59,27 +57,18 @@ def meshing(cloud: Mesh) -> Work:
     apart = spacing(distance)
     cell = _cell(apart, len(points))
     yield Progress(0.05, LABEL)
-    all_points, all_values = points, values
-    while True:
-        points, values = thinned(all_points, cell / 2, all_values)
-        _refuse_few(points)
-        distance, near = nearest(points, IN_PLANE)
-        facing, off = planes(points, near)
-        apart = spacing(distance)
-        if np.median(off / apart) < THICK:
-            break
-        cell *= WIDER
-        yield Progress(0.1, LABEL)
+    settled = yield from portion(settling(points, values, cell / 2, LABEL), 0.05, 0.2)
+    kept = (
+        np.zeros(0, bool) if settled is None else ~specks(settled.apart, settled.distance[:, 1:], settled.near[:, 1:])
+    )
+    _refuse_few(kept)
     yield Progress(0.2, LABEL)
-    kept = ~specks(apart, distance[:, 1:], near[:, 1:])
-    points, values, apart = points[kept], values[kept], apart[kept]
-    _refuse_few(points)
-    near = nearest(points, IN_PLANE)[1]
-    facing = planes(points, near)[0]
-    told = None if cloud.normals is None else _as_told(facing, values[:, -3:], near)
-    facing = outward(points, facing, near) if told is None else told
+    settled, _ = Settled.of(settled.points[kept], settled.values[kept])
+    told = None if cloud.normals is None else _as_told(settled)
+    facing = outward(settled.points, settled.facing, settled.near) if told is None else told
     yield Progress(0.35, LABEL)
-    surface = Spheres(points, facing, apart, values)
+    surface = Spheres(settled.points, facing, settled.apart, settled.values)
+    cell = max(cell, _cell(settled.apart, len(settled.apart)))
     return (yield from portion(_drawn(surface, cell, cloud.colour is not None), 0.35, 1.0))
 
 
@@ -92,33 +81,36 @@ def _usable(cloud):
     if len(points) > MOST:
         raise InputError(f"The scan has {len(points)} points, more than memory allows: reduce it to {MOST} or fewer.")
     usable = np.isfinite(points).all(axis=1) & np.isfinite(values).all(axis=1)
-    _refuse_few(points[usable])
+    _refuse_few(usable)
     from_middle = np.abs(points - np.median(points[usable], axis=0)).max(axis=1)
     with np.errstate(invalid="ignore"):
         usable &= from_middle <= STRAY * np.quantile(from_middle[usable], 0.9)
     points, first = np.unique(points[usable], axis=0, return_index=True)
-    _refuse_few(points)
+    _refuse_few(np.ones(len(points), bool))
     return points, values[usable][first]
 
 
 def _cell(apart, count):
     """How wide the cells are for ``count`` points, some of which are ``apart`` (n,) from each other."""
-    spacing, area = np.median(apart), np.mean(apart**2) * count
+    spacing = np.median(apart)
+    area = np.mean(np.minimum(apart, FARTHER * spacing) ** 2) * count
     return max(WIDTH * spacing, min(WIDEST * spacing, np.sqrt(area / CELLS)), np.sqrt(area / MOST_CELLS))
 
 
-def _refuse_few(points):
-    if len(points) < FEWEST:
+def _refuse_few(usable):
+    count = int(usable.sum())
+    if count < FEWEST:
         raise InputError(
-            f"The scan has no faces, and only {len(points)} points that tell a surface, too few for a head: choose another "
+            f"The scan has no faces, and only {count} points that tell a surface, too few for a head: choose another "
             "file, or make a mesh of it (the scanner's software can)."
         )
 
 
-def _as_told(facing, normals, near):
-    """``facing`` (n, 3) on the side of ``normals`` (n, 3), or None if those of ``near`` (n, k) points do not agree."""
-    turned = np.where(np.einsum("ij,ij->i", facing, normals)[:, None] < 0, -facing, facing)
-    agree = np.einsum("nki,ni->nk", normals[near[:, 1:]], normals) > 0
+def _as_told(settled: Settled):
+    """Its planes' normals (n, 3) on the side that the last three of its values tell, or None if neighbours' disagree."""
+    normals = settled.values[:, -3:]
+    turned = np.where(np.einsum("ij,ij->i", settled.facing, normals)[:, None] < 0, -settled.facing, settled.facing)
+    agree = np.einsum("nki,ni->nk", normals[settled.near[:, 1:]], normals) > 0
     return turned if agree.mean() > AGREE else None
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How closely the points of a cloud lie, which planes they lie in, which of them are specks, and fewer of them."""
+"""How closely the points of a cloud lie, which planes they lie in, and which of them are specks."""
 
 import numpy as np
 from scipy.sparse import coo_matrix
@@ -30,19 +30,6 @@ def nearest(points: np.ndarray, count: int, of: np.ndarray | None = None) -> tup
 def spacing(distance: np.ndarray) -> np.ndarray:
     """(n,) how far apart points lie whose nearest are ``distance`` (n, k) away, if in squares on a surface."""
     return distance[:, CLOSE - 1] * np.sqrt(np.pi / CLOSE)
-
-
-def thinned(points: np.ndarray, cell: float, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """One point for each cube with sides of ``cell`` that has any of ``points`` (n, 3), where they lie on average; and the
-    mean of their ``values`` (n, k)."""
-    places = np.floor((points - points.min(axis=0)) / cell).astype(np.int64)
-    span = places.max(axis=0) + 1
-    _, owner, share = np.unique(
-        (places[:, 0] * span[1] + places[:, 1]) * span[2] + places[:, 2], return_inverse=True, return_counts=True
-    )
-    both = [*points.T, *values.T]
-    mean = np.stack([np.bincount(owner, column, minlength=len(share)) / share for column in both], axis=1)
-    return mean[:, :3], mean[:, 3:]
 
 
 def planes(points: np.ndarray, near: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
