@@ -158,6 +158,21 @@ def test_normals_that_are_given_say_which_side_is_out():
     assert (np.einsum("ij,ij->i", middle, normal) < 0).all()
 
 
+def test_points_that_a_camera_did_not_measure():
+    """They stand at the origin, or have no place, or no normal."""
+    points = ball(4000) + [0, 0, 500.0]
+    normals = ((points - [0, 0, 500.0]) / -60).astype(np.float32)
+    normals[::7] = np.nan
+    nothing = np.concatenate([np.zeros((6000, 3)), np.full((500, 3), np.nan)])
+    cloud = Mesh(np.concatenate([points, nothing]), NONE, normals=np.concatenate([normals, nothing.astype(np.float32)]))
+    mesh = meshed(cloud)
+    assert np.abs(np.linalg.norm(mesh.vertices - [0, 0, 500.0], axis=1) - 60).max() < 0.1
+    middle, normal = facing(mesh)
+    assert len(borders(mesh)) == 0 and (
+        abs(np.sign(np.einsum("ij,ij->i", middle - [0, 0, 500.0], normal)).sum()) == len(normal)
+    )
+
+
 @pytest.mark.parametrize("sign", [0.0, 1.0])
 def test_normals_whose_signs_are_left_to_chance_are_not_heard(sign):
     points = ball(3000)

@@ -25,6 +25,7 @@ import numpy as np
 
 from ..anatomy.storage import write_atomically
 from ..errors import InputError
+from ..file_bytes import file_bytes
 from ..finite_numbers import is_number
 from .echo_file import colour_path, echo_bytes, is_echo, parse_echo, with_colour
 from .png_image import png_bytes, read_png
@@ -66,7 +67,7 @@ def read_range_map(path) -> RangeMap:
     if kind == ".json":
         return _from_json(path)
     beside = colour_path(path)
-    return parse_echo(_bytes(path), str(path), None if beside is None else _image(beside))
+    return parse_echo(file_bytes(path), str(path), None if beside is None else _image(beside))
 
 
 def write_range_map(path, range_map: RangeMap) -> list[Path]:
@@ -121,18 +122,9 @@ def _frame(range_map: RangeMap) -> dict:
     }
 
 
-def _bytes(path: Path) -> bytes:
-    try:
-        return path.read_bytes()
-    except OSError as error:
-        raise InputError(
-            f"{path} cannot be read ({error.strerror}): check the name and that you may read it."
-        ) from error
-
-
 def _image(path: Path) -> np.ndarray:
     """(h, w, 3) 0..1 of a colour file."""
-    data = _bytes(path)
+    data = file_bytes(path)
     if path.suffix.lower() != ".png":
         return read_sgi(data, str(path))
     pixels = read_png(data, str(path))
@@ -142,7 +134,7 @@ def _image(path: Path) -> np.ndarray:
 
 def _from_npz(path: Path) -> RangeMap:
     try:
-        with np.load(io.BytesIO(_bytes(path)), allow_pickle=False) as file:
+        with np.load(io.BytesIO(file_bytes(path)), allow_pickle=False) as file:
             given = {key: file[key] for key in file.files}
     except (ValueError, OSError, KeyError, EOFError, TypeError) as error:
         if isinstance(error, InputError):
@@ -164,13 +156,13 @@ def _from_npz(path: Path) -> RangeMap:
 
 def _from_json(path: Path) -> RangeMap:
     try:
-        given = json.loads(_bytes(path).decode("utf-8-sig"))
+        given = json.loads(file_bytes(path).decode("utf-8-sig"))
     except (ValueError, RecursionError):
         raise InputError(f"{path} is no JSON: give the description of a range map ({FORMAT}).") from None
     if not isinstance(given, dict) or given.get("format") != FORMAT or not isinstance(given.get("radius"), str):
         raise InputError(f'{path} describes no range map: it needs "format": "{FORMAT}" and "radius": a 16-bit PNG.')
     beside = _beside(path, given["radius"])
-    pixels = read_png(_bytes(beside), str(beside))
+    pixels = read_png(file_bytes(beside), str(beside))
     if pixels.dtype != np.uint16 or pixels.shape[2] > 2:
         raise InputError(f"{beside} is not a grey PNG of 16 bits: save the ranges as one.")
     unit = given.get("radius_unit_mm", UNIT)

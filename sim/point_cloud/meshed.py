@@ -10,7 +10,7 @@ from .facing import outward
 from .neighbourhoods import CLOSE, batches, discs, nearest, spacing, specks
 from .sphere_fit import Spheres
 from .surface_nets import Grid
-from .thinning import Settled, settling
+from .thinning import Settled, settling, thinned
 
 #: Fewer points than this show no face, more would not fit the memory of an ordinary machine.
 FEWEST, MOST = 1000, 100_000_000
@@ -18,6 +18,7 @@ FEWEST, MOST = 1000, 100_000_000
 #: up to a width at which it still shows what they do, and from there on, so that no more than these do.
 WIDTH, CELLS = 0.8, 150_000
 WIDEST, MOST_CELLS = 1.2, 1_000_000
+SAME = 1e-6  # of the extent: points that are no farther apart are one, as those of triangles that share no vertex
 #: Points that tell the spacing of all. Some may be `FARTHER` spacings apart; more are outliers.
 TELLING = 20_000
 FARTHER = 4.0
@@ -77,17 +78,18 @@ def _usable(cloud):
     place."""
     points = cloud.vertices
     known = [table for table in (cloud.colour, cloud.normals) if table is not None]
-    values = np.concatenate([np.zeros((len(points), 0)), *known], axis=1)
+    values = np.nan_to_num(np.concatenate([np.zeros((len(points), 0)), *known], axis=1))
     if len(points) > MOST:
         raise InputError(f"The scan has {len(points)} points, more than memory allows: reduce it to {MOST} or fewer.")
-    usable = np.isfinite(points).all(axis=1) & np.isfinite(values).all(axis=1)
+    usable = np.isfinite(points).all(axis=1)
     _refuse_few(usable)
     from_middle = np.abs(points - np.median(points[usable], axis=0)).max(axis=1)
     with np.errstate(invalid="ignore"):
         usable &= from_middle <= STRAY * np.quantile(from_middle[usable], 0.9)
-    points, first = np.unique(points[usable], axis=0, return_index=True)
+    extent = np.ptp(points[usable], axis=0).max()
+    points, values, _ = thinned(points[usable], max(SAME * extent, np.finfo(float).tiny), values[usable])
     _refuse_few(np.ones(len(points), bool))
-    return points, values[usable][first]
+    return points, values
 
 
 def _cell(apart, count):

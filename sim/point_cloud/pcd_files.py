@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError
+from ..file_bytes import file_bytes
 from ..mesh import Mesh
 
 #: What a header may take.
@@ -21,12 +22,7 @@ def read_pcd(path) -> Mesh:
     InputError : the file cannot be read, is no PCD, is cut off, compressed, or has no points.
     """
     path = Path(path)
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise InputError(
-            f"{path} cannot be read ({error.strerror}): check the name and that you may read it."
-        ) from error
+    data = file_bytes(path)
     header, start = _header(data, path)
     columns = _columns(data[start:], header, path)
     if any(axis not in columns for axis in "xyz") or not len(columns["x"]):

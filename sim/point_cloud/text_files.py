@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError
+from ..file_bytes import file_bytes
 from ..mesh import Mesh
 
 EXTENSIONS = (".xyz", ".xyzrgb", ".xyzn", ".pts", ".asc", ".csv", ".txt")
@@ -26,12 +27,7 @@ def read_points(path) -> Mesh:
     InputError : the file cannot be read or has no points.
     """
     path = Path(path)
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise InputError(
-            f"{path} cannot be read ({error.strerror}): check the name and that you may read it."
-        ) from error
+    data = file_bytes(path)
     return _as_cloud(_table(data, path))
 
 

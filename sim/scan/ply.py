@@ -11,6 +11,7 @@ import numpy as np
 
 from ..anatomy.storage import write_atomically
 from ..errors import InputError
+from ..file_bytes import file_bytes
 from ..mesh import Mesh
 from .ply_body import open_body
 from .ply_header import read_header
@@ -45,12 +46,7 @@ def read_textured_ply(path) -> tuple[Mesh, tuple[str, ...]]:
     InputError : as `read_ply`, and for faces with places of other corners than theirs.
     """
     path = Path(path)
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise InputError(
-            f"{path} cannot be read ({error.strerror}): check the name and that you may read it."
-        ) from error
+    data = file_bytes(path)
     header = read_header(data, path)
     body = open_body(data, header.start, header.encoding, path)
     columns = {element.name: body.element(element) for element in header.elements}
