@@ -203,6 +203,6 @@ def test_the_import_takes_maps_for_scans(bpy, tmp_path):
     assert len(mesh.vertices) > 0.9 * made.valid.sum() and mesh.colour is not None
     radius = np.linalg.norm((mesh.vertices - made.origin) @ made.axes.T[:, :2], axis=1)
     assert radius.min() > 79 and radius.max() < 101
-    (tmp_path / "notes.txt").write_text("no scan")
+    (tmp_path / "notes.doc").write_text("no scan")
     with pytest.raises(InputError, match="ECH"):
-        scan_import.check_file(tmp_path / "notes.txt")
+        scan_import.check_file(tmp_path / "notes.doc")

@@ -6,8 +6,10 @@ import pytest
 
 from headshop.sim.errors import InputError
 from headshop.sim.mesh import Mesh
+from headshop.sim.mesh_subdivision import smoother
 from headshop.sim.point_cloud.pcd_files import read_pcd
 from headshop.sim.point_cloud.text_files import read_points
+from headshop.sim.progress import finish
 from headshop.sim.scan.ply import read_textured_ply, write_ply
 
 XYZ = np.array([[1.5, -2, 3], [4, 5, -6.25], [0, 0.5, 7]])
@@ -175,6 +177,26 @@ def test_every_kind_comes_in_as_points(bpy, tmp_path, name):
     wanted = XYZ[:, [0, 2, 1]] * [1, 1, -1] / 1000 if name == "a.glb" else XYZ
     np.testing.assert_allclose(read.vertices, wanted, atol=1e-6)
     assert len(read.faces) == 0
+
+
+def test_landmarks_are_found_on_points(bpy, reference, tmp_path):
+    """In metres, upside down, noisy, with colours, a point to a line."""
+    from headshop.headshop_addon import pipeline
+
+    rng = np.random.default_rng(11)
+    operator, quads = smoother(reference.skin.faces, len(reference.skin.vertices), 2)
+    inner = operator @ reference.groups["inner"].astype(float) > 0.5
+    points = (operator @ reference.skin.vertices)[~inner]
+    points = points + rng.normal(0, 0.1, points.shape)
+    turned = points * [-1, 1, -1] / 1000
+    path = tmp_path / "head.xyz"
+    np.savetxt(path, np.concatenate([turned, np.tile([200, 150, 130], (len(turned), 1))], axis=1), fmt="%.6f")
+    scan, found = finish(pipeline.load_scan_alone(path))
+    assert scan.report["points"] == len(points) and scan.report["unit"] == "m" and scan.report["up"] == "-Z"
+    assert np.abs(scan.mesh.colour - np.array([200, 150, 130]) / 255).max() < 0.01
+    truth = reference.landmark_positions()
+    off = {name: np.linalg.norm(place - truth[name]) for name, place in found.positions.items()}
+    assert np.median(list(off.values())) < 1.5 and off["prn"] < 1.5
 
 
 @pytest.mark.parametrize("kind", ["MESH", "POINTCLOUD"])
