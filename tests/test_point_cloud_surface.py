@@ -79,22 +79,36 @@ def test_gaps_that_chance_leaves_between_points_are_closed():
     assert len(borders(mesh)) < 0.002 * len(mesh.vertices)
 
 
+def sheet(thick: float) -> tuple[np.ndarray, np.ndarray]:
+    """Points (n, 3) on all of a sheet of 60 mm by 60, 1.2 mm apart, and the normals there."""
+    along = np.linspace(-30, 30, 51)
+    x, y = np.meshgrid(along, along)
+    side = np.stack([x, y, np.full_like(x, thick / 2)], axis=-1).reshape(-1, 3)
+    turn = np.linspace(-np.pi / 2, np.pi / 2, 9)[1:-1]
+    out = np.stack([np.cos(turn), 0 * turn, np.sin(turn)], axis=-1)[:, None] + np.zeros((51, 1))
+    rim = (np.stack([0 * along + 30, along, 0 * along], axis=-1) + thick / 2 * out).reshape(-1, 3)
+    out, up = out.reshape(-1, 3), np.tile([0, 0, 1.0], (len(side), 1))
+    turns = [(order, flip) for order in ([0, 1, 2], [1, 0, 2]) for flip in (1, -1)]
+    points = [side, -side, *(flip * rim[:, order] for order, flip in turns)]
+    return np.concatenate(points), np.concatenate([up, -up, *(flip * out[:, order] for order, flip in turns)])
+
+
 def test_both_sides_of_a_thin_sheet_face_out():
-    """As those of an ear do, 3 mm thick: neighbours through it are as near as those in it."""
-    x, y = np.meshgrid(np.arange(-30, 30.5, 1.2), np.arange(-30, 30.5, 1.2))
-    sheet = np.stack([x, y, np.full_like(x, 1.5)], axis=-1).reshape(-1, 3)
-    turn = np.linspace(-np.pi / 2, np.pi / 2, 5)[1:-1]
-    rim = np.stack(
-        [np.broadcast_to(v, (len(turn), 51)) for v in (0 * turn[:, None], np.arange(-30, 30.5, 1.2)[None], 0)], -1
-    )
-    rim = rim + np.stack([30 + 1.5 * np.cos(turn), 0 * turn, 1.5 * np.sin(turn)], -1)[:, None]
-    rims = [rim, rim * [-1, 1, 1], rim[..., [1, 0, 2]], rim[..., [1, 0, 2]] * [1, -1, 1]]
-    points = np.concatenate([sheet, sheet * [1, 1, -1], *(r.reshape(-1, 3) for r in rims)])
-    middle, normal = facing(meshed(Mesh(points, NONE)))
+    """As those of an ear do."""
+    middle, normal = facing(meshed(Mesh(sheet(3.0)[0], NONE)))
     flat = (np.abs(middle[:, :2]) < 27).all(axis=1)
     assert flat.sum() > 2000
     assert (np.abs(np.abs(middle[flat, 2]) - 1.5) < 0.1).all()
     assert (normal[flat, 2] * middle[flat, 2] > 0).all()
+
+
+def test_sides_are_not_passed_on_through_a_sheet():
+    """The nearest on the other side lies in a plane as alike as those beside it."""
+    points, normals = sheet(0.8)
+    turned = outward(
+        points, normals * np.random.default_rng(12).choice([-1, 1], (len(points), 1)), nearest(points, 12)[1]
+    )
+    assert (np.einsum("ij,ij->i", turned, normals) > 0).all()
 
 
 def test_noise_is_averaged_and_makes_cells_wider():
@@ -239,6 +253,30 @@ def test_spheres_are_exact_on_a_sphere_and_on_a_plane():
     np.testing.assert_allclose(flat.outside(np.array([[5.3, 6.1, 0.4], [4.0, 4.0, -0.7]])), [0.4, -0.7], atol=1e-9)
 
 
+def test_the_other_side_of_a_sheet_is_not_heard():
+    points, normals = sheet(0.8)
+    spheres = Spheres(points, normals, np.full(len(points), 1.2), np.zeros((len(points), 0)))
+    places = np.array([[3.3, 2.1, 0.7], [-7.0, 9.4, 0.5], [0.5, 0.2, -0.9]])
+    np.testing.assert_allclose(spheres.outside(places), [0.3, 0.1, 0.5], atol=1e-9)
+
+
+def test_far_points_count_as_much_as_close_ones():
+    """On the edge of where they are close, more of the nearest lie on that side; the surface is not drawn by them alone."""
+    close, far = (
+        np.meshgrid(np.arange(-6, 0, 0.5), np.arange(-6, 6, 0.5)),
+        np.meshgrid(np.arange(1, 9, 2.0), np.arange(-6, 6, 2.0)),
+    )
+    flat = [np.stack([x.ravel(), y.ravel(), 0 * x.ravel()], axis=1) for x, y in (close, far)]
+    lifted = np.concatenate([flat[0], flat[1] + [0, 0, 1.0]])
+    apart = np.concatenate([np.full(len(flat[0]), 0.5), np.full(len(flat[1]), 2.0)])
+    spheres = [
+        Spheres(lifted, np.tile([0, 0, 1.0], (len(lifted), 1)), a, np.zeros((len(lifted), 0)))
+        for a in (apart, apart * 0 + 1)
+    ]
+    fair, unfair = (s.outside(np.array([[0.4, 0.3, 0.5]]))[0] for s in spheres)
+    assert fair < unfair - 0.1  # the far ones lie higher
+
+
 def test_sides_are_passed_on_whatever_they_were():
     points = ball(2000)
     near = nearest(points, 12)[1]
@@ -250,6 +288,18 @@ def test_sides_are_passed_on_whatever_they_were():
     apart = np.concatenate([points, points + [500.0, 0, 0]])  # two pieces, each bulging from its own middle
     turned = outward(apart, np.concatenate([normals, -normals]), np.concatenate([near, near + 2000]))
     assert (np.einsum("ij,ij->i", turned, np.concatenate([points, points])) > 0).all()
+
+
+def test_a_patch_faces_away_from_the_whole():
+    """As hair on the crown, the rest of which was not seen, and a dish at that: by itself it bulges the other way."""
+    rng = np.random.default_rng(13)
+    patch = rng.uniform(-8, 8, (80, 2))
+    dish = np.column_stack([patch, 80 + (patch**2).sum(axis=1) / 40])
+    points = np.concatenate([ball(2000), dish])
+    normals = np.concatenate([ball(2000), np.column_stack([-patch / 20, np.ones(80)])])
+    near = np.concatenate([nearest(ball(2000), 8)[1], 2000 + nearest(dish, 8)[1]])
+    turned = outward(points, normals / np.linalg.norm(normals, axis=1, keepdims=True), near)
+    assert (np.einsum("ij,ij->i", turned, normals) > 0).all()
 
 
 def test_a_grid_has_the_surface_of_a_function():

@@ -18,7 +18,7 @@ FEWEST, MOST = 1000, 100_000_000
 #: up to a width at which it still shows what they do, and from there on, so that no more than these do.
 WIDTH, CELLS = 0.8, 150_000
 WIDEST, MOST_CELLS = 1.2, 1_000_000
-SAME = 1e-6  # of the extent: points that are no farther apart are one, as those of triangles that share no vertex
+SAME = 4e-6  # of the extent: points that are no farther apart are one, as those of triangles that share no vertex
 #: Points that tell the spacing of all. Some may be `FARTHER` spacings apart; more are outliers.
 TELLING = 20_000
 FARTHER = 4.0
