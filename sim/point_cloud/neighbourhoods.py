@@ -50,11 +50,15 @@ def specks(apart: np.ndarray, distance: np.ndarray, near: np.ndarray) -> np.ndar
     Of those ``near`` (n, k) each, ``distance`` (n, k) away, those hang together that are no farther than `FAR` times as far
     apart as points lie about either, ``apart`` (n,).
     """
-    linked = distance < FAR * np.minimum(apart[:, None], apart[near])
-    one, other = np.nonzero(linked)[0], near[linked]
-    graph = coo_matrix((np.ones(len(one), np.int8), (one, other)), shape=(len(apart),) * 2)
-    piece = connected_components(graph, directed=False)[1]
+    piece = pieces(near, distance < FAR * np.minimum(apart[:, None], apart[near]))
     return np.bincount(piece)[piece] < SPECK
+
+
+def pieces(near: np.ndarray, linked: np.ndarray) -> np.ndarray:
+    """(n,) the piece that each point is of, if points hang together with those ``near`` (n, k) that are ``linked`` (n, k)."""
+    one, other = np.nonzero(linked)[0], near[linked]
+    graph = coo_matrix((np.ones(len(one), np.int8), (one, other)), shape=(len(near),) * 2)
+    return connected_components(graph, directed=False)[1]
 
 
 def discs(points: np.ndarray, normals: np.ndarray, radius: np.ndarray, step: float) -> np.ndarray:

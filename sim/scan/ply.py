@@ -13,6 +13,7 @@ from ..anatomy.storage import write_atomically
 from ..errors import InputError
 from ..file_bytes import file_bytes
 from ..mesh import Mesh
+from ..point_cloud.splats import are_splats, on_splats
 from .ply_body import open_body
 from .ply_header import read_header
 from .ply_texture import corner_places
@@ -26,7 +27,8 @@ def read_ply(path) -> Mesh:
     """The mesh in a PLY file without its pictures; polygons of more than four corners become fans of triangles.
 
     Positions are returned as they stand in the file, in its own unit. ``colour`` is (n, 3) float32 in 0..1 or None. A file
-    without faces gives a mesh without faces, and the ``normals`` of its points if it has them (`sim.point_cloud`).
+    without faces gives a mesh without faces, and the ``normals`` of its points if it has them; of Gaussian splats, points on
+    them (`sim.point_cloud`).
 
     Raises
     ------
@@ -146,9 +148,11 @@ def _corners(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _points(path, vertices, colour, columns) -> Mesh:
-    """Points without faces, with their normals."""
+    """Points without faces, with their normals; or those on splats."""
     if not len(vertices):
         raise InputError(f"{path} has neither faces nor points: export the scan again.")
+    if are_splats(columns):
+        return on_splats(vertices, columns)
     normals = None
     if all(name in columns for name in _NORMAL):
         normals = np.stack([np.asarray(columns[name], dtype=np.float32) for name in _NORMAL], axis=1)
