@@ -72,6 +72,7 @@ def _upright(mesh, counts, found, unit, up, seconds):
         "up_told": up is not None,
         "up": found.up,
         "front": found.front,
+        "rotation": found.rotation.tolist(),
         "certain": bool(found.certain),
         "orientation": found.reason,
     }

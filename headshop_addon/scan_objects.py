@@ -104,7 +104,7 @@ def resize(scan: bpy.types.Object, factor: float) -> str:
 
 
 def stand_upright(scan: bpy.types.Object, found: FoundLandmarks) -> FoundLandmarks:
-    """Turn the ``scan`` by as many quarter turns as the landmarks ``found`` on it tell, unless an artist said which way is up;
+    """Turn the ``scan`` as the landmarks ``found`` on it tell (`sim.scan.orientation`), unless an artist said which way is up;
     returns them on what it is then.
 
     Without them a face is laid on all of the scan, which in bodies and rooms lies anywhere. What was adopted stays in its
@@ -113,7 +113,7 @@ def stand_upright(scan: bpy.types.Object, found: FoundLandmarks) -> FoundLandmar
     facts = heads.read_report(scan).get("scan", {})
     if facts.get("up_told", True):
         return found
-    turn = detect(bridge.object_to_mesh(scan), found.positions, unit=1.0).rotation
+    turn = detect(bridge.object_to_mesh(scan), found.positions, unit=1.0, called=facts["unit"]).rotation
     if np.allclose(turn, np.eye(3)):
         return found
     matrix = Matrix(turn.tolist()).to_4x4()
@@ -124,7 +124,8 @@ def stand_upright(scan: bpy.types.Object, found: FoundLandmarks) -> FoundLandmar
     scan[TURN] = whole.ravel().tolist()
     up, front = axis_names(whole)
     said = f"{read_as(facts['unit'], facts['unit_scale'], whole)}: {FOUND} say so."
-    heads.write_report(scan, {"scan": facts | {"up": up, "front": front, "certain": True, "orientation": said}})
+    facts |= {"up": up, "front": front, "rotation": whole.tolist(), "certain": True, "orientation": said}
+    heads.write_report(scan, {"scan": facts})
     return found.placed({name: turn @ place for name, place in found.positions.items()})
 
 

@@ -5,6 +5,7 @@ import json
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from headshop.sim.landmarks import find
 from headshop.sim.landmarks.find import FoundLandmarks
@@ -23,21 +24,24 @@ def truth(reference):
 
 @pytest.fixture
 def lying(addon, reference, truth, tmp_path, monkeypatch):
-    """``lying(**options)`` -> the object of a scan that was read as if it were upright as it lies; its landmarks are found."""
+    """``lying(turn, **options)`` -> the object of a scan that was read as upright as it lies, and whose landmarks are found."""
     from headshop.headshop_addon import pipeline
 
     def upright(mesh, *_, **__):
         yield Progress(0.5, "")
         return _as_it_is()
 
+    turned = [ASIDE]
+
     def found(mesh, **_):
         yield Progress(0.5, "")
-        places = {name: ASIDE @ place for name, place in truth.items()}
+        places = {name: turned[-1] @ place for name, place in truth.items()}
         return FoundLandmarks(places, dict.fromkeys(places, 0.9), (), (), 1.0, 1.0)
 
-    def make(**options):
+    def make(turn=ASIDE, **options):
+        turned.append(turn)
         path = tmp_path / "scan.ply"
-        write_ply(path, reference.skin.moved(reference.skin.vertices @ ASIDE.T))
+        write_ply(path, reference.skin.moved(reference.skin.vertices @ turn.T))
         assert addon.ops.headshop.import_scan(filepath=str(path), **options) == {"FINISHED"}
         return addon.context.scene.headshop.scan
 
@@ -78,6 +82,25 @@ def test_a_scan_that_lies_is_set_upright_with_its_landmarks(addon, lying, refere
     path = tmp_path / "landmarks.json"  # in the axes of the file, as before
     addon.ops.headshop.save_landmarks(filepath=str(path))
     assert json.loads(path.read_text())["landmarks"]["sto"] == pytest.approx(list(ASIDE @ [2.0, -90.0, 40.0]), abs=1e-3)
+
+
+def test_a_scan_in_axes_that_nobody_set_is_set_upright_and_faces_forward(addon, lying, reference, truth, tmp_path):
+    from headshop.headshop_addon import scan_landmarks
+
+    turn = Rotation.from_euler("xyz", [40, 50, 45], degrees=True).as_matrix()
+    scan = lying(turn)
+    assert addon.ops.headshop.find_landmarks() == {"FINISHED"}
+    np.testing.assert_allclose(_points(scan), reference.skin.vertices, atol=1e-2)
+    for name, place in scan_landmarks.positions(scan, "FOUND").items():
+        assert place == pytest.approx(truth[name], abs=1e-2)
+    facts = _facts(scan)
+    assert facts["certain"] is True and "degrees to stand upright and face forward" in facts["orientation"]
+    np.testing.assert_allclose(facts["rotation"], turn.T, atol=1e-5)
+    path = tmp_path / "landmarks.json"
+    addon.ops.headshop.save_landmarks(filepath=str(path))
+    assert json.loads(path.read_text())["landmarks"]["prn"] == pytest.approx(list(turn @ truth["prn"]), abs=1e-2)
+    addon.ops.headshop.load_landmarks(filepath=str(path))
+    assert scan_landmarks.positions(scan, "FOUND")["prn"] == pytest.approx(truth["prn"], abs=1e-2)
 
 
 def test_what_an_artist_said_is_up_stays_up(addon, lying):

@@ -3,12 +3,13 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from headshop.sim.errors import InputError
 from headshop.sim.mesh import Mesh
-from headshop.sim.scan.orientation import detect, rotations
+from headshop.sim.scan.orientation import axis_names, detect, rotations
 from headshop.sim.scan.ply import read_ply
-from headshop.sim.scan.units import UNITS, plausible_units
+from headshop.sim.scan.units import BY_FACE, UNITS, plausible_units
 
 
 @pytest.fixture(scope="module")
@@ -73,6 +74,55 @@ def test_the_reason_names_whose_landmarks_they_are(reference, skin):
     assert detect(skin, places, picked=False).reason.endswith(": the landmarks that were found say so.")
     over = detect(skin, places, up="-Z")
     assert not over.certain and "but by the landmarks the head is turned by" in over.reason
+
+
+def _turned(skin, reference, turn):
+    """The skin and the landmarks of a head that ``turn`` would set upright."""
+    places = {name: p @ turn for name, p in reference.landmark_positions().items()}
+    return skin.moved(skin.vertices @ turn), places
+
+
+def _angle(turn):
+    return np.degrees(np.arccos((np.trace(turn) - 1) / 2))
+
+
+@pytest.mark.parametrize("seed", [1, 4, 12])
+def test_a_head_turned_as_nobody_holds_it_is_set_upright(reference, skin, seed):
+    turn = Rotation.random(random_state=seed).as_matrix()
+    assert min(_angle(turn.T @ r) for r in rotations()) > 35
+    scan, places = _turned(skin, reference, turn)
+    found = detect(scan, places)
+    np.testing.assert_allclose(found.rotation, turn, atol=1e-6)
+    np.testing.assert_allclose(found.inverse(found.apply(scan.vertices)), scan.vertices)
+    assert found.certain and "degrees to stand upright and face forward: the landmarks say so." in found.reason
+    nearest = min(rotations(), key=lambda r: _angle(turn.T @ r))
+    assert (found.up, found.front) == axis_names(nearest)
+
+
+@pytest.mark.parametrize("held", [-20.0, 15.0])
+def test_who_stands_at_an_angle_is_turned_about_the_vertical_and_holds_the_head_as_before(reference, skin, held):
+    angle, nod = Rotation.from_euler("z", 45, degrees=True), Rotation.from_euler("x", held, degrees=True)
+    turn = rotations()[4].T @ (angle * nod).as_matrix()  # of +Y up
+    scan, places = _turned(skin, reference, turn.T)
+    found = detect(scan, places)
+    np.testing.assert_allclose(found.rotation @ turn, nod.as_matrix(), atol=1e-6)
+    assert found.up == "+Y" and found.certain and "turned by 45 degrees" in found.reason
+
+
+def test_a_head_held_aside_stays_so_and_what_was_told_stays_up(reference, skin):
+    aside = Rotation.from_euler("zx", [20, 20], degrees=True).as_matrix()
+    assert np.array_equal(detect(*_turned(skin, reference, aside)).rotation, np.eye(3))
+    loose = detect(*_turned(skin, reference, aside), unit=1.0, called=BY_FACE)
+    np.testing.assert_allclose(loose.rotation, aside, atol=1e-6)
+    lying = Rotation.from_euler("yz", [45, 50], degrees=True).as_matrix()
+    scan, places = _turned(skin, reference, lying)
+    told = detect(scan, places, up="+Z")
+    np.testing.assert_allclose(told.rotation[2], [0, 0, 1])
+    assert not told.certain and "but by the landmarks" in told.reason
+    both = detect(scan, places, up="+Z", front="-Y")
+    assert np.array_equal(both.rotation, np.eye(3)) and not both.certain
+    looks = detect(scan, places, front="-Y")
+    assert np.array_equal(looks.rotation[1], [0, 1, 0])
 
 
 def test_a_unit_that_makes_no_head_is_refused_although_it_is_told(skin):

@@ -35,6 +35,9 @@ RIVAL, POOR = 1.25, 4.5
 #: has 3.0; animals, parts and balls in any size 3.4 and more.
 PLAIN, OWN = 3.3, 2.4
 OTHER = 1.3  # times a size that is plainly not its own: another that is tried
+#: Degrees by which a head is held or turned at most in a scan that stands and faces along its axes; and between its up and an
+#: axis that is taken for up where the face looks along none. In a scan of no unit axes are as good as any: `LOOSE` is both.
+HELD, LEVEL, LOOSE = 35.0, 25.0, 15.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,8 +48,9 @@ class Orientation:
     ----------
     unit : name from `units.UNITS`, `CUSTOM` or `BY_FACE`
     unit_scale : mm per scan unit
-    up, front : the scan's own axes that point up and where the face looks, like ``+Z`` and ``-Y``
-    rotation : (3, 3) proper, permutes and flips axes only: the scan keeps its own place and tilt
+    up, front : the scan's own axes that point up and where the face looks, like ``+Z`` and ``-Y``, or are nearest to that
+    rotation : (3, 3) proper. It permutes and flips axes only, so that the scan keeps its place and the head the way it is held;
+        unless landmarks tell that the head is turned farther from them than it would be held
     certain : False when another reading is nearly as good; ``reason`` then says so
     reason : one sentence for the report
     """
@@ -189,17 +193,21 @@ def _rotation(up: str, front: str) -> np.ndarray:
 
 
 def axis_names(rotation: np.ndarray) -> tuple[str, str]:
-    """Which of a scan's axes point up and where the face looks, like ``+Z`` and ``-Y``; ``rotation`` : as of `Orientation`."""
+    """Which of a scan's axes are nearest to up and to where the face looks, like ``+Z`` and ``-Y``; ``rotation`` : as of
+    `Orientation`."""
+    nearest = _nearest(rotations(), rotation)
 
     def name(v):
         return next(k for k, axis in AXES.items() if axis @ v > 0.5)
 
-    return name(rotation[2]), name(-rotation[1])
+    return name(nearest[2]), name(-nearest[1])
 
 
 def read_as(name: str, scale: float, rotation: np.ndarray) -> str:
-    """How a scan was read, in words: its unit, and which of its axes are which."""
-    return "Read as {}, {} up, face toward {}".format(unit_words(name, scale), *axis_names(rotation))
+    """How a scan was read, in words: its unit, which of its axes are which, and how far it was turned from them."""
+    words = "Read as {}, {} up, face toward {}".format(unit_words(name, scale), *axis_names(rotation))
+    turned = _angle(_nearest(rotations(), rotation), rotation)
+    return f"{words}, and turned by {turned:.0f} degrees to stand upright and face forward" if turned > 1 else words
 
 
 def _axis(text: str | None) -> str | None:
@@ -233,10 +241,13 @@ def _turn_of_landmarks(given, canonical):
 
 
 def _by_landmarks(turn, allowed, name, scale, picked):
-    rotation = max(allowed, key=lambda r: np.trace(r.T @ turn))
-    tilt = np.degrees(np.arccos(np.clip((np.trace(rotation.T @ turn) - 1) / 2, -1, 1)))
+    rotation = _nearest(allowed, turn)
+    held, level = (LOOSE, LOOSE) if name == BY_FACE else (HELD, LEVEL)
+    if _angle(rotation, turn) >= held:
+        rotation = _stood(turn, rotation, allowed, level)
+    tilt = _angle(rotation, turn)
     up, front = axis_names(rotation)
-    certain = bool(tilt < 35)
+    certain = bool(tilt < HELD)
     reason = read_as(name, scale, rotation)
     marks = "the landmarks" if picked else FOUND
     if certain:
@@ -244,3 +255,32 @@ def _by_landmarks(turn, allowed, name, scale, picked):
     else:
         reason += f", but by {marks} the head is turned by {tilt:.0f} degrees from these axes: check them"
     return Orientation(name, scale, up, front, rotation, certain, reason + ".")
+
+
+def _stood(turn, rotation, allowed, level):
+    """The rotation for a head that ``turn`` would set upright, and that nobody holds as ``rotation``, the nearest of those
+    ``allowed``, would leave it.
+
+    Where the scan's own axis is up, or was told to be, it turns about that, and the head stays as it is held: a body may stand
+    at any angle in its room.
+    """
+    up = rotation[2]
+    told = len({tuple(r[2]) for r in allowed}) == 1
+    if len(allowed) < len(rotations()) and not (told and len(allowed) > 1):
+        return rotation
+    back = turn[1] - (turn[1] @ up) * up
+    if np.linalg.norm(back) < 0.5:
+        return rotation if told else turn
+    if not told and up @ turn[2] < np.cos(np.radians(level)):
+        return turn
+    back /= np.linalg.norm(back)
+    return np.stack([np.cross(back, up), back, up])
+
+
+def _nearest(allowed, turn):
+    return max(allowed, key=lambda r: np.trace(r.T @ turn))
+
+
+def _angle(one, other) -> float:
+    """Degrees between two rotations."""
+    return float(np.degrees(np.arccos(np.clip((np.trace(one.T @ other) - 1) / 2, -1, 1))))
