@@ -73,6 +73,22 @@ def object_to_mesh(obj: bpy.types.Object, basis: bool = True) -> Mesh:
     return mesh_of(obj.data, vertices)
 
 
+def shown_mesh(obj: bpy.types.Object, graph: bpy.types.Depsgraph) -> Mesh:
+    """The mesh or points of an object as the viewport shows them, with modifiers and shape keys, in its local space, mm.
+
+    Raises
+    ------
+    InputError : it is neither a mesh nor a point cloud object.
+    """
+    shown = obj.evaluated_get(graph)
+    if obj.type != "MESH":
+        return object_to_mesh(shown)
+    try:
+        return mesh_of(shown.to_mesh(preserve_all_data_layers=True, depsgraph=graph))
+    finally:
+        shown.to_mesh_clear()
+
+
 def mesh_of(data: bpy.types.Mesh, vertices: np.ndarray | None = None) -> Mesh:
     """A Blender mesh datablock as a `Mesh` (mm), optionally with other positions (n, 3) mm."""
     if vertices is None:

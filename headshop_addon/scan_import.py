@@ -177,6 +177,6 @@ def _meshes_of(scene) -> list[Mesh]:
     for obj in [obj for obj in objects if len(obj.data.polygons)] or objects:
         mesh = with_pictures(bridge.object_to_mesh(obj), obj)
         matrix = np.array(obj.evaluated_get(graph).matrix_world)
-        points = mesh.vertices * bridge.METRES
-        meshes.append(mesh.moved(points @ matrix[:3, :3].T + matrix[:3, 3]))
+        mesh = mesh.transformed(bridge.METRES * matrix[:3, :3])
+        meshes.append(mesh.moved(mesh.vertices + matrix[:3, 3]))
     return meshes

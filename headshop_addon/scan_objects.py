@@ -26,6 +26,7 @@ from .scan_texture import with_pictures
 TURN = "headshop_turn"
 IN_PLACE = "headshop_in_place"  # whether the scan stands in the place of an object that it was adopted from
 ROUNDED = 1e-6  # between two scales that are one
+FLAT = 1e-6  # part of its longest side that an object scaled to nothing is deep
 
 
 def import_scan(context, path, unit: str | None = None, up: str | None = None) -> Work:
@@ -53,18 +54,39 @@ def adopt(context, original: bpy.types.Object) -> Work:
     """Work that makes a clean, upright copy of a mesh or point cloud object the scan, in the original's place, and hides that;
     returns the copy.
 
+    It is what the viewport shows: with modifiers and shape keys, and as wide, high, deep or mirrored as its scale makes it.
+
     Raises
     ------
-    InputError : it is no head (`sim.scan.clean`, `sim.scan.orientation`).
+    InputError : it is no head (`sim.scan.clean`, `sim.scan.orientation`), or is scaled to nothing.
     """
-    scan = yield from pipeline.prepare_scan(joined([with_pictures(bridge.object_to_mesh(original), original)]))
+    graph = context.evaluated_depsgraph_get()
+    place, stretch = _unstretched(original)
+    mesh = with_pictures(bridge.shown_mesh(original, graph), original.evaluated_get(graph)).transformed(stretch)
+    scan = yield from pipeline.prepare_scan(joined([mesh]))
     obj = _add(context, scan, f"{original.name} Scan")
     turn = scan.orientation.matrix  # mm to mm here: the translation is zero, so it serves for metres too
-    obj.matrix_world = original.matrix_world @ Matrix(np.linalg.inv(turn).tolist())
+    obj.matrix_world = place @ Matrix(np.linalg.inv(turn).tolist())
     obj[IN_PLACE] = True
     original.hide_set(True)
     look_at(context)
     return obj
+
+
+def _unstretched(obj) -> tuple[Matrix, np.ndarray]:
+    """Where ``obj`` is, as a matrix that turns, moves and scales in all directions alike; and the rest of its own, (3, 3)."""
+    world = np.array(obj.matrix_world)
+    left, sizes, right = np.linalg.svd(world[:3, :3])
+    if sizes[2] < FLAT * sizes[0]:
+        raise InputError(f"{obj.name} has a scale of 0 in some direction: give it another scale, or apply it.")
+    scale = np.cbrt(sizes.prod())
+    mirrored = np.sign(np.linalg.det(world[:3, :3]))
+    if mirrored > 0 and np.ptp(sizes) < 10 * ROUNDED * scale:
+        return obj.matrix_world.copy(), np.eye(3)
+    whole = np.eye(4)
+    whole[:3, :3] = scale * left @ right * mirrored
+    whole[:3, 3] = world[:3, 3]
+    return Matrix(whole.tolist()), right.T @ np.diag(sizes / scale) @ right * mirrored
 
 
 def _add(context, scan, name: str) -> bpy.types.Object:

@@ -17,10 +17,13 @@ LARGEST = 4096  # pixels of a side: larger pictures are made smaller, for the sk
 
 
 def with_pictures(mesh: Mesh, obj: bpy.types.Object) -> Mesh:
-    """``mesh``, which was read from ``obj``, with the pictures that its materials show; as it is, if they show none."""
+    """``mesh``, which was read from ``obj``, with the pictures that its materials show; as it is, if they show none.
+
+    ``obj`` may be evaluated, as modifiers may bring materials.
+    """
     if mesh.uv is None or mesh.material is None:
         return mesh
-    materials = [slot.material for slot in obj.material_slots]
+    materials = [slot.material and slot.material.original for slot in obj.material_slots]
     images = [None if material is None else image_of(material) for material in materials]
     read = {image: pixels_of(image) for image in dict.fromkeys(images) if image is not None}
     if all(pixels is None for pixels in read.values()):

@@ -56,6 +56,20 @@ class Mesh:
             raise ValueError(f"a mesh of {len(self.vertices)} vertices cannot take positions of shape {vertices.shape}")
         return replace(self, vertices=vertices)
 
+    def transformed(self, matrix: np.ndarray) -> "Mesh":
+        """The same mesh with its positions and normals mapped by ``matrix`` (3, 3); what is mirrored keeps its outside."""
+        matrix = np.asarray(matrix, dtype=np.float64)
+        out = self.moved(self.vertices @ matrix.T)
+        if self.normals is not None:
+            normals = self.normals @ np.linalg.inv(matrix)
+            length = np.linalg.norm(normals, axis=1, keepdims=True)
+            out = replace(out, normals=(normals / np.where(length > 0, length, 1)).astype(np.float32))
+        if np.linalg.det(matrix) > 0:
+            return out
+        order = np.where(self.faces[:, 3:] >= 0, [0, 3, 2, 1], [0, 2, 1, 3])
+        uv = None if self.uv is None else np.take_along_axis(self.uv, order[:, :, None], axis=1)
+        return replace(out, faces=np.take_along_axis(self.faces, order, axis=1), uv=uv)
+
 
 def vertex_normals(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """(n, 3) unit normals, area-weighted; zero where a vertex has no triangle."""

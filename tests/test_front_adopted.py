@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""An object in the scene becomes the scan as the viewport shows it: with modifiers, shape keys, its scale, mirrored or not."""
+
+import numpy as np
+import pytest
+
+from headshop.sim.health.topology import volume
+
+
+@pytest.fixture
+def original(addon, reference):
+    """The reference's skin as an object, selected and active."""
+    from headshop.headshop_addon import bridge
+
+    obj = bridge.mesh_to_object(reference.skin, "Raw")
+    addon.context.scene.collection.objects.link(obj)
+    addon.context.view_layer.objects.active = obj
+    obj.select_set(True)
+    return obj
+
+
+@pytest.fixture
+def adopted(addon, monkeypatch):
+    """``adopted()`` -> the scan that the active object becomes, which is upright as it is."""
+    from headshop.headshop_addon import pipeline
+    from headshop.sim.progress import Progress
+    from headshop.sim.scan.orientation import Orientation
+
+    def upright(mesh, *_, **__):
+        yield Progress(0.5, "")
+        return Orientation("mm", 1.0, "+Z", "-Y", np.eye(3), True, "As it is.")
+
+    def make():
+        assert addon.ops.headshop.choose_scan() == {"FINISHED"}
+        return addon.context.scene.headshop.scan
+
+    monkeypatch.setattr(pipeline, "detecting", upright)
+    return make
+
+
+def _world(obj):
+    """(n, 3) m: where the viewport shows its vertices."""
+    import bpy
+
+    bpy.context.view_layer.update()
+    shown = obj.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    points = np.empty(3 * len(shown.data.vertices), np.float32)
+    shown.data.vertices.foreach_get("co", points)
+    matrix = np.array(shown.matrix_world)
+    return points.reshape(-1, 3) @ matrix[:3, :3].T + matrix[:3, 3]
+
+
+def _same_places(one, other):
+    from scipy.spatial import cKDTree
+
+    return max(cKDTree(one).query(other)[0].max(), cKDTree(other).query(one)[0].max()) < 1e-5
+
+
+def _own(obj):
+    from headshop.headshop_addon import bridge
+
+    return bridge.object_to_mesh(obj)
+
+
+def test_modifiers_and_shape_keys_count_as_shown(original, adopted):
+    original.shape_key_add(name="Basis")
+    key = original.shape_key_add(name="Longer")
+    for point in key.data[:500]:
+        point.co.z += 0.02
+    key.value = 0.5
+    original.modifiers.new("Cut", "DECIMATE").ratio = 0.5
+    hidden = original.modifiers.new("Hidden", "SUBSURF")
+    hidden.show_viewport = False
+    shown, count = _world(original), len(original.data.polygons)
+    scan = adopted()
+    assert len(scan.data.polygons) < 1.2 * count and not scan.modifiers
+    assert _same_places(_world(scan), shown)
+    assert len(original.data.polygons) == count and len(original.modifiers) == 2
+
+
+def test_a_scale_of_its_own_in_each_direction_is_the_scans_shape(original, adopted, reference):
+    original.scale, original.rotation_euler, original.location = (1.0, 1.1, 1.3), (0.2, 0.5, -0.4), (1, 2, 3)
+    shown = _world(original)
+    scan = adopted()
+    assert _same_places(_world(scan), shown)
+    sizes = np.linalg.svd(np.array(scan.matrix_world)[:3, :3])[1]
+    assert np.ptp(sizes) < 1e-5 and sizes[0] == pytest.approx((1.1 * 1.3) ** (1 / 3), rel=1e-5)
+    tall = np.ptp(_own(scan).vertices, axis=0) / np.ptp(reference.skin.vertices, axis=0)
+    assert tall[2] / tall[0] == pytest.approx(1.3, rel=1e-3)
+
+
+def test_a_mirrored_object_is_another_person_and_not_inside_out(original, adopted, reference):
+    original.scale, original.rotation_euler = (-2.0, 2.0, 2.0), (0.2, 0.5, -0.4)
+    shown = _world(original)
+    scan = adopted()
+    assert _same_places(_world(scan), shown)
+    matrix = np.array(scan.matrix_world)[:3, :3]
+    assert np.linalg.det(matrix) == pytest.approx(8, rel=1e-5) and np.allclose(
+        matrix @ matrix.T, 4 * np.eye(3), atol=1e-5
+    )
+    mesh = _own(scan)
+    assert np.sign(volume(mesh)) == np.sign(volume(reference.skin)) != 0
+
+
+def test_an_object_that_is_turned_and_larger_keeps_its_own_space(original, adopted, reference):
+    original.scale, original.rotation_euler, original.location = (3, 3, 3), (0.2, 0.5, -0.4), (1, 2, 3)
+    _world(original)
+    scan = adopted()
+    np.testing.assert_allclose(np.array(scan.matrix_world), np.array(original.matrix_world), atol=1e-5)
+    np.testing.assert_allclose(_own(scan).vertices, reference.skin.vertices, atol=1e-4)
+
+
+def test_what_is_scaled_to_nothing_is_refused(addon, original):
+    original.scale = (1, 1, 0)
+    with pytest.raises(
+        RuntimeError, match="Raw has a scale of 0 in some direction: give it another scale, or apply it"
+    ):
+        addon.ops.headshop.choose_scan()
+    assert addon.context.scene.headshop.scan is None and not original.hide_get()
