@@ -21,7 +21,7 @@ READY := $(VENV)/.ready
 # A process of tests takes some 2 GB.
 SIDE_BY_SIDE := -n auto --maxprocesses 4 --dist worksteal
 
-# Several threads of linear algebra sum in another order: last digits may differ.
+# Several threads of linear algebra sum in another order: last digits may differ; and beside other processes they are slower.
 ONE := OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1
 
 .PHONY: demo test check assets sheets extension bench clean
@@ -30,7 +30,7 @@ demo: $(READY)
 	$(PY) -m headshop.headshop_addon.demo -o out/demo
 
 test: $(READY)
-	$(PY) -m pytest $(SIDE_BY_SIDE) $(ARGS)
+	$(ONE) $(PY) -m pytest $(SIDE_BY_SIDE) $(ARGS)
 
 check: $(READY)
 	$(PY) -m ruff check .
