@@ -72,6 +72,7 @@ def test_bad_files_get_one_sentence(bad_scan, kind, says):
         (b"element vertex 400", b"element vertex many", "damaged header"),
         (b"binary_little_endian", b"binary_middle_endian", "unknown encoding"),
         (b"property float x", b"property float q", "without x, y and z"),
+        (b"property float x", b"property uint packed_position", "compressed Gaussian splats: export"),
         (b"end_header", b"end_of_it", "within its header"),
     ],
 )

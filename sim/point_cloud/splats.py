@@ -15,6 +15,8 @@ from .neighbourhoods import SPECK, nearest, pieces
 
 OPACITY, SCALES, TURNS = "opacity", ("scale_0", "scale_1", "scale_2"), ("rot_0", "rot_1", "rot_2", "rot_3")
 COLOURS = ("f_dc_0", "f_dc_1", "f_dc_2")
+#: What compressed files have instead, several numbers in the bits of one.
+PACKED = "packed_position"
 #: The first spherical harmonic, which is the same in all directions.
 HARMONIC = 0.5 / np.sqrt(np.pi)
 #: What is less opaque than this is haze, or colours the surface behind it.

@@ -13,7 +13,7 @@ from ..anatomy.storage import write_atomically
 from ..errors import InputError
 from ..file_bytes import file_bytes
 from ..mesh import Mesh
-from ..point_cloud.splats import are_splats, on_splats
+from ..point_cloud.splats import PACKED, are_splats, on_splats
 from .ply_body import open_body
 from .ply_header import read_header
 from .ply_texture import corner_places
@@ -122,6 +122,8 @@ def _ascii_text(vertices, faces) -> bytes:
 
 
 def _vertices(columns, path):
+    if PACKED in columns:
+        raise InputError(f"{path} holds compressed Gaussian splats: export them as an uncompressed PLY.")
     if any(axis not in columns for axis in "xyz"):
         raise InputError(f"{path} has vertices without x, y and z: export the scan again as a mesh.")
     positions = np.stack([np.asarray(columns[axis], dtype=np.float64) for axis in "xyz"], axis=1)
