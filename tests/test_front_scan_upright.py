@@ -103,6 +103,17 @@ def test_a_scan_in_axes_that_nobody_set_is_set_upright_and_faces_forward(addon, 
     assert scan_landmarks.positions(scan, "FOUND")["prn"] == pytest.approx(truth["prn"], abs=1e-2)
 
 
+@pytest.mark.parametrize("unit", ["mm", "face"])
+def test_a_scan_in_no_unit_stands_upright_where_one_in_millimetres_is_held_so(addon, lying, unit):
+    from headshop.headshop_addon import heads
+
+    scan = lying(Rotation.from_euler("xyz", [12, 15, 18], degrees=True).as_matrix())
+    heads.write_report(scan, {"scan": _facts(scan) | {"unit": unit}})
+    before = _points(scan)
+    assert addon.ops.headshop.find_landmarks() == {"FINISHED"}
+    assert np.array_equal(_points(scan), before) == (unit == "mm")
+
+
 def test_what_an_artist_said_is_up_stays_up(addon, lying):
     scan = lying(up="+Z")
     before = _points(scan)

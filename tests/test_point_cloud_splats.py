@@ -30,7 +30,8 @@ def columns(deviations, turns, opacity=SOLID, colour=(0.8, 0.5, 0.2), stretch=1.
     count = len(deviations)
     known = {f"scale_{k}": column for k, column in enumerate(np.log(deviations).T)}
     known |= {f"rot_{k}": column * stretch for k, column in enumerate(turns.as_quat()[:, [3, 0, 1, 2]].T)}
-    known |= {f"f_dc_{k}": np.full(count, (value - 0.5) / HARMONIC) for k, value in enumerate(colour)}
+    colour = np.broadcast_to(colour, (count, 3))
+    known |= {f"f_dc_{k}": (column - 0.5) / HARMONIC for k, column in enumerate(colour.T)}
     return known | {"opacity": np.broadcast_to(opacity, count)}
 
 
@@ -69,9 +70,13 @@ def test_haze_background_and_floaters_are_left_out():
     wide = np.concatenate([deviations, deviations[:500], np.full((500, 3), 200.0), np.full((len(float_), 3), 2.0)])
     rows = [*range(3000), *range(1000), *range(len(float_))]
     opacity = np.where(np.arange(len(points)) // 500 == 6, -0.5, SOLID)
-    cloud = on_splats(points, columns(wide, turns[rows], opacity))
+    own = rng.random((len(points), 3))
+    mixed = rng.permutation(len(points))
+    cloud = on_splats(points[mixed], columns(wide[mixed], turns[np.array(rows)[mixed]], opacity[mixed], own[mixed]))
     np.testing.assert_allclose(np.linalg.norm(cloud.vertices, axis=1), RADIUS, atol=0.2)
-    assert len(np.unique(cKDTree(middles).query(cloud.vertices)[1])) == len(middles)
+    away, nearest = cKDTree(middles).query(cloud.vertices)
+    assert len(np.unique(nearest)) == len(middles)
+    np.testing.assert_allclose(cloud.colour[away < 1e-9], own[nearest[away < 1e-9]], atol=1e-6)
 
 
 def test_what_has_no_place_or_no_turn():

@@ -109,6 +109,12 @@ def test_who_stands_at_an_angle_is_turned_about_the_vertical_and_holds_the_head_
     assert found.up == "+Y" and found.certain and "turned by 45 degrees" in found.reason
 
 
+def test_a_face_that_looks_along_what_was_told_to_be_up_is_not_turned_about_it(reference, skin):
+    scan, places = _turned(skin, reference, Rotation.from_euler("zx", [50, 88], degrees=True).as_matrix())
+    told = detect(scan, places, up="+Z")
+    assert not told.certain and any(np.array_equal(told.rotation, r) for r in rotations())
+
+
 def test_a_head_held_aside_stays_so_and_what_was_told_stays_up(reference, skin):
     aside = Rotation.from_euler("zx", [20, 20], degrees=True).as_matrix()
     assert np.array_equal(detect(*_turned(skin, reference, aside)).rotation, np.eye(3))
