@@ -89,6 +89,12 @@ def shown_mesh(obj: bpy.types.Object, graph: bpy.types.Depsgraph) -> Mesh:
         shown.to_mesh_clear()
 
 
+def read_numbers(data: bpy.types.Mesh | bpy.types.PointCloud) -> dict[str, np.ndarray]:
+    """Name -> (n,) float32: the attributes of vertices or points that are a number each."""
+    kept = [a for a in data.attributes if a.data_type == "FLOAT" and a.domain == "POINT"]
+    return {attribute.name: _get(attribute.data, "value", 1) for attribute in kept}
+
+
 def mesh_of(data: bpy.types.Mesh, vertices: np.ndarray | None = None) -> Mesh:
     """A Blender mesh datablock as a `Mesh` (mm), optionally with other positions (n, 3) mm."""
     if vertices is None:

@@ -16,6 +16,8 @@ from ..sim.adapt.landmarks import read_landmark_file, write_landmarks
 from ..sim.anatomy.landmark_names import SKIN
 from ..sim.errors import InputError
 from ..sim.landmarks.find import FoundLandmarks
+from ..sim.mesh import Mesh
+from ..sim.point_cloud.splats import are_splats, on_splats
 from ..sim.progress import Work, finish
 from ..sim.scan.joined import joined
 from ..sim.scan.orientation import FOUND, Orientation, axis_names, detect, read_as
@@ -60,10 +62,8 @@ def adopt(context, original: bpy.types.Object) -> Work:
     ------
     InputError : it is no head (`sim.scan.clean`, `sim.scan.orientation`), or is scaled to nothing.
     """
-    graph = context.evaluated_depsgraph_get()
     place, stretch = _unstretched(original)
-    mesh = with_pictures(bridge.shown_mesh(original, graph), original.evaluated_get(graph)).transformed(stretch)
-    scan = yield from pipeline.prepare_scan(joined([mesh]))
+    scan = yield from pipeline.prepare_scan(joined([_shown(context, original).transformed(stretch)]))
     obj = _add(context, scan, f"{original.name} Scan")
     turn = scan.orientation.matrix  # mm to mm here: the translation is zero, so it serves for metres too
     obj.matrix_world = place @ Matrix(np.linalg.inv(turn).tolist())
@@ -71,6 +71,21 @@ def adopt(context, original: bpy.types.Object) -> Work:
     original.hide_set(True)
     look_at(context)
     return obj
+
+
+def _shown(context, original) -> Mesh:
+    """What the viewport shows of an object; of splats that were imported as points, with their numbers as attributes, points on
+    them."""
+    graph = context.evaluated_depsgraph_get()
+    shown = original.evaluated_get(graph)
+    mesh = bridge.shown_mesh(original, graph)
+    if len(mesh.faces):
+        return with_pictures(mesh, shown)
+    numbers = bridge.read_numbers(shown.data)
+    if not are_splats(numbers):
+        return mesh
+    cloud = on_splats(mesh.vertices * bridge.METRES, numbers)
+    return cloud.moved(cloud.vertices / bridge.METRES)
 
 
 def _unstretched(obj) -> tuple[Matrix, np.ndarray]:

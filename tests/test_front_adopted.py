@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """An object in the scene becomes the scan as the viewport shows it: with modifiers, shape keys, its scale, mirrored or not."""
 
+import json
+
 import numpy as np
 import pytest
 
 from headshop.sim.health.topology import volume
+from headshop.sim.point_cloud.splats import COLOURS, OPACITY, SCALES, TURNS
 
 
 @pytest.fixture
@@ -108,6 +111,29 @@ def test_an_object_that_is_turned_and_larger_keeps_its_own_space(original, adopt
     scan = adopted()
     np.testing.assert_allclose(np.array(scan.matrix_world), np.array(original.matrix_world), atol=1e-5)
     np.testing.assert_allclose(_own(scan).vertices, reference.skin.vertices, atol=1e-4)
+
+
+def test_splats_that_were_imported_as_points_are_splats(addon, adopted):
+    """Blender keeps their numbers as attributes of vertices, in the file's own unit."""
+    from headshop.headshop_addon import heads
+
+    rng = np.random.default_rng(1)
+    middles = rng.normal(size=(4000, 3))
+    middles *= 0.1 / np.linalg.norm(middles, axis=1)[:, None]
+    data = addon.data.meshes.new("Splats")
+    data.from_pydata(middles.tolist(), [], [])
+    known = {"opacity": 3.0, "rot_0": 1.0, "f_dc_0": 1.0, "f_dc_1": -1.0}
+    for name in (*COLOURS, OPACITY, *SCALES, *TURNS):
+        value = np.log(0.003) if name.startswith("scale") else known.get(name, 0.0)
+        data.attributes.new(name, "FLOAT", "POINT").data.foreach_set("value", np.full(len(middles), value, np.float32))
+    obj = addon.data.objects.new("Splats", data)
+    addon.context.scene.collection.objects.link(obj)
+    addon.context.view_layer.objects.active = obj
+    scan = adopted()
+    off = np.abs(np.linalg.norm(_own(scan).vertices, axis=1) - 100)
+    assert np.median(off) < 0.5 and np.quantile(off, 0.9) < 3  # what stands across the surface reaches out of it
+    assert json.loads(scan[heads.REPORT])["scan"]["points"] > 2 * len(middles)
+    assert _own(scan).colour.mean(axis=0) == pytest.approx([0.782, 0.218, 0.5], abs=0.01)
 
 
 def test_what_is_scaled_to_nothing_is_refused(addon, original):
