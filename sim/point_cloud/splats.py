@@ -93,15 +93,14 @@ def _spread(points, u, v):
     area = np.where(strand, 0.0, long * short) * np.pi * REACH**2
     step = max(np.median(short), np.sqrt(area.sum() / MOST))
     one, other = (np.where(strand, 0, np.rint(REACH * half / step)).astype(np.int64) for half in (long, short))
-    placed, owner = [points], [np.arange(len(points))]
+    placed, owner = [], []
     kinds, kind = np.unique(np.stack([one, other], axis=1), axis=0, return_inverse=True)
     for k, (across, along) in enumerate(kinds):
         some = np.flatnonzero(kind.ravel() == k)
         places = np.stack(np.meshgrid(_steps(across), _steps(along)), axis=-1).reshape(-1, 2)
-        for x, y in places[(places**2).sum(axis=1) <= 1.0][:MOST]:
-            if x or y:
-                placed.append(points[some] + REACH * (x * u[some] + y * v[some]))
-                owner.append(some)
+        x, y = REACH * places[(places**2).sum(axis=1) <= 1.0][:, :, None, None].swapaxes(0, 1)
+        placed.append((points[some] + x * u[some] + y * v[some]).reshape(-1, 3))
+        owner.append(np.tile(some, len(x)))
     return np.concatenate(placed), np.concatenate(owner)
 
 
