@@ -29,3 +29,17 @@ def muscles_collection(skin: bpy.types.Object) -> bpy.types.Collection | None:
     muscles = set(heads.muscles_of(skin).values())
     children = collection.children if collection else ()
     return next((child for child in children if muscles & set(child.objects)), None)
+
+
+def choosable(context) -> list[bpy.types.Object]:
+    """The objects that an artist means by a scan: of the selected ones those that may be, the active one first; if there are
+    none, the active one."""
+    first = context.active_object
+    kept = [obj for obj in context.selected_objects if _may_be_scan(obj)]
+    if not kept and first is not None and _may_be_scan(first):
+        return [first]
+    return sorted(kept, key=lambda obj: obj != first)
+
+
+def _may_be_scan(obj) -> bool:
+    return obj.type in ("MESH", "POINTCLOUD") and heads.PART not in obj

@@ -16,19 +16,15 @@ from ..sim.adapt.landmarks import read_landmark_file, write_landmarks
 from ..sim.anatomy.landmark_names import SKIN
 from ..sim.errors import InputError
 from ..sim.landmarks.find import FoundLandmarks
-from ..sim.mesh import Mesh
-from ..sim.point_cloud.splats import are_splats, on_splats
 from ..sim.progress import Work, finish
-from ..sim.scan.joined import joined
 from ..sim.scan.orientation import FOUND, Orientation, axis_names, detect, read_as
 from ..sim.scan.units import BY_FACE, UNITS, USUAL, unit_words
 from . import active, bridge, heads, pipeline, scan_landmarks
-from .scan_texture import with_pictures
+from .shown_objects import as_one
 
 TURN = "headshop_turn"
 IN_PLACE = "headshop_in_place"  # whether the scan stands in the place of an object that it was adopted from
 ROUNDED = 1e-6  # between two scales that are one
-FLAT = 1e-6  # part of its longest side that an object scaled to nothing is deep
 
 
 def import_scan(context, path, unit: str | None = None, up: str | None = None) -> Work:
@@ -52,56 +48,26 @@ def add_sample(context, sample, with_landmarks: bool = True) -> bpy.types.Object
     return obj
 
 
-def adopt(context, original: bpy.types.Object) -> Work:
-    """Work that makes a clean, upright copy of a mesh or point cloud object the scan, in the original's place, and hides that;
-    returns the copy.
+def adopt(context, originals: list[bpy.types.Object]) -> Work:
+    """Work that makes a clean, upright copy of meshes or point clouds the scan, in their place, and hides those; returns it.
 
-    It is what the viewport shows: with modifiers and shape keys, and as wide, high, deep or mirrored as its scale makes it.
+    It is what the viewport shows: with modifiers and shape keys, and as wide, high, deep or mirrored as scales make it. It is
+    called after the first, and stands as that does.
 
     Raises
     ------
-    InputError : it is no head (`sim.scan.clean`, `sim.scan.orientation`), or is scaled to nothing.
+    InputError : they are no head (`sim.scan.clean`, `sim.scan.orientation`), or the first is scaled to nothing.
     """
-    place, stretch = _unstretched(original)
-    scan = yield from pipeline.prepare_scan(joined([_shown(context, original).transformed(stretch)]))
-    obj = _add(context, scan, f"{original.name} Scan")
+    mesh, place = as_one(context, originals)
+    scan = yield from pipeline.prepare_scan(mesh)
+    obj = _add(context, scan, f"{originals[0].name} Scan")
     turn = scan.orientation.matrix  # mm to mm here: the translation is zero, so it serves for metres too
     obj.matrix_world = place @ Matrix(np.linalg.inv(turn).tolist())
     obj[IN_PLACE] = True
-    original.hide_set(True)
+    for original in originals:
+        original.hide_set(True)
     look_at(context)
     return obj
-
-
-def _shown(context, original) -> Mesh:
-    """What the viewport shows of an object; of splats that were imported as points, with their numbers as attributes, points on
-    them."""
-    graph = context.evaluated_depsgraph_get()
-    shown = original.evaluated_get(graph)
-    mesh = bridge.shown_mesh(original, graph)
-    if len(mesh.faces):
-        return with_pictures(mesh, shown)
-    numbers = bridge.read_numbers(shown.data)
-    if not are_splats(numbers):
-        return mesh
-    cloud = on_splats(mesh.vertices * bridge.METRES, numbers)
-    return cloud.moved(cloud.vertices / bridge.METRES)
-
-
-def _unstretched(obj) -> tuple[Matrix, np.ndarray]:
-    """Where ``obj`` is, as a matrix that turns, moves and scales in all directions alike; and the rest of its own, (3, 3)."""
-    world = np.array(obj.matrix_world)
-    left, sizes, right = np.linalg.svd(world[:3, :3])
-    if sizes[2] < FLAT * sizes[0]:
-        raise InputError(f"{obj.name} has a scale of 0 in some direction: give it another scale, or apply it.")
-    scale = np.cbrt(sizes.prod())
-    mirrored = np.sign(np.linalg.det(world[:3, :3]))
-    if mirrored > 0 and np.ptp(sizes) < 10 * ROUNDED * scale:
-        return obj.matrix_world.copy(), np.eye(3)
-    whole = np.eye(4)
-    whole[:3, :3] = scale * left @ right * mirrored
-    whole[:3, 3] = world[:3, 3]
-    return Matrix(whole.tolist()), right.T @ np.diag(sizes / scale) @ right * mirrored
 
 
 def _add(context, scan, name: str) -> bpy.types.Object:

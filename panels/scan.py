@@ -28,7 +28,7 @@ class HEADSHOP_PT_scan(SidebarPanel, bpy.types.Panel):
         column.operator("headshop.import_scan", icon="IMPORT")
         row = column.row(align=True)
         row.operator("headshop.make_sample", icon="USER")
-        row.operator("headshop.choose_scan", text="Use Active", icon="RESTRICT_SELECT_OFF")
+        row.operator("headshop.choose_scan", text="Use Selected", icon="RESTRICT_SELECT_OFF")
         scan = active.scan(context)
         if scan is None:
             hint(layout, context, "Start here: import the scan of a head, or add the sample to try things out.")

@@ -81,6 +81,37 @@ def test_modifiers_and_shape_keys_count_as_shown(original, adopted):
     assert len(original.data.polygons) == count and len(original.modifiers) == 2
 
 
+def test_what_is_selected_is_one_scan(original, adopted, addon, reference):
+    """As an importer leaves it: a part of the head is active, the empty above it selected too; a light counts for nothing."""
+    from headshop.headshop_addon import bridge
+
+    eye = bridge.mesh_to_object(reference.parts["eye_l"], "Eye")
+    cloud = addon.data.objects.new("Loose", addon.data.meshes.new("Loose"))
+    cloud.data.from_pydata([(9, 9, 9), (8, 8, 8)], [], [])
+    above = addon.data.objects.new("Root", None)
+    light = addon.data.objects.new("Light", addon.data.lights.new("Light", "POINT"))
+    for obj in (eye, cloud, above, light):
+        addon.context.scene.collection.objects.link(obj)
+        obj.select_set(True)
+    above.scale, above.rotation_euler = (2, 2, 2), (0.1, 0.2, 0.3)
+    eye.parent = original.parent = above
+    eye.scale, eye.location = (1.5, -1, 1), (0.1, 0, 0)
+    addon.context.view_layer.objects.active = eye
+    shown = np.concatenate([_world(original), _world(eye)])
+    scan = adopted()
+    assert scan.name == "Eye Scan" and _same_places(_world(scan), shown)
+    assert original.hide_get() and eye.hide_get() and not light.hide_get()
+
+
+def test_without_a_selection_the_active_object_is_the_scan(original, adopted, addon):
+    original.select_set(False)
+    other = addon.data.objects.new("Root", None)
+    addon.context.scene.collection.objects.link(other)
+    other.select_set(True)
+    assert adopted().name == "Raw Scan"
+    assert not addon.ops.headshop.choose_scan.poll()  # a scan is none to choose
+
+
 def test_a_scale_of_its_own_in_each_direction_is_the_scans_shape(original, adopted, reference):
     original.scale, original.rotation_euler, original.location = (1.0, 1.1, 1.3), (0.2, 0.5, -0.4), (1, 2, 3)
     shown = _world(original)
