@@ -20,7 +20,7 @@ def as_one(context, objects: list[bpy.types.Object]) -> tuple[Mesh, Matrix]:
     """What is shown of ``objects`` as one mesh in mm; and the matrix that puts it where they are: it turns, moves and scales in
     all directions alike, as the first of them does.
 
-    Points without faces count only where nothing has any.
+    Points without faces count only where nothing has any (`sim.scan.clean`).
 
     Raises
     ------
@@ -37,7 +37,7 @@ def as_one(context, objects: list[bpy.types.Object]) -> tuple[Mesh, Matrix]:
             mesh = mesh.transformed(matrix[:3, :3])
             mesh = mesh.moved(mesh.vertices + matrix[:3, 3] / bridge.METRES)
         meshes.append(mesh)
-    return joined([mesh for mesh in meshes if len(mesh.faces)] or meshes), place
+    return joined(meshes), place
 
 
 def _shown(obj, graph) -> Mesh:

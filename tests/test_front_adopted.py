@@ -100,7 +100,7 @@ def test_what_is_selected_is_one_scan(original, adopted, addon, reference):
     shown = np.concatenate([_world(original), _world(eye)])
     scan = adopted()
     assert scan.name == "Eye Scan" and _same_places(_world(scan), shown)
-    assert original.hide_get() and eye.hide_get() and not light.hide_get()
+    assert original.hide_get() and eye.hide_get() and cloud.hide_get() and not light.hide_get()
 
 
 def test_without_a_selection_the_active_object_is_the_scan(original, adopted, addon):
