@@ -59,6 +59,29 @@ def addon(bpy, reference):
     addon_utils.disable("headshop", default_set=True)
 
 
+@pytest.fixture
+def skin_object(addon, reference):
+    """``skin_object(name)`` -> the reference's skin as an object in the scene."""
+    from headshop.headshop_addon import bridge
+
+    def make(name):
+        obj = bridge.mesh_to_object(reference.skin, name)
+        addon.context.scene.collection.objects.link(obj)
+        return obj
+
+    return make
+
+
+@pytest.fixture
+def scan_object(addon, skin_object):
+    """The reference's skin as the chosen scan."""
+    from headshop.headshop_addon import scan_landmarks
+
+    obj = addon.context.scene.headshop.scan = skin_object("Scan")
+    scan_landmarks.entries(obj)
+    return obj
+
+
 @pytest.fixture(autouse=True)
 def _leave_no_scene_behind():
     """Tests that touched Blender leave an empty scene; tests of `sim` never import it."""

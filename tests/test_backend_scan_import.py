@@ -6,6 +6,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from headshop.sim.errors import InputError
+from headshop.sim.health.topology import volume
 from headshop.sim.mesh import Mesh
 from headshop.sim.scan.ply import write_ply
 
@@ -76,6 +77,22 @@ def test_several_objects_are_joined_where_they_stand(bpy, tmp_path, bowl):
     scan = scan_import.read_scan(tmp_path / "two.glb")
     assert len(scan.triangles) == 2 * len(bowl.triangles)
     assert np.ptp(scan.vertices[:, 0]) == pytest.approx(0.43, abs=1e-4)
+
+
+@pytest.mark.parametrize("extension", [".glb", ".usdc", ".fbx"])
+def test_a_mirrored_object_in_a_file_keeps_its_outside(bpy, tmp_path, reference, extension):
+    from headshop.headshop_addon import bridge, scan_import
+
+    eye = reference.parts["eye_l"]
+    obj = bridge.mesh_to_object(eye, "eye")
+    bpy.context.scene.collection.objects.link(obj)
+    obj.scale.x = -1
+    bpy.context.view_layer.update()
+    path = tmp_path / f"mirrored{extension}"
+    _WRITERS[extension](bpy, str(path))
+    scan = scan_import.read_scan(path)
+    assert scan.vertices[:, 0].mean() == pytest.approx(-eye.vertices[:, 0].mean() / 1000, rel=0.02)
+    assert volume(scan) == pytest.approx(volume(eye) * 1e-9, rel=1e-3)
 
 
 def test_a_binary_stl_that_is_cut_off(bpy, tmp_path, bowl):

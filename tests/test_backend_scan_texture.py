@@ -238,6 +238,26 @@ def test_an_adopted_object_keeps_its_picture(addon, sheet):
     assert has_pictures(mesh) and mesh.colour is not None
 
 
+def test_a_picture_that_a_modifier_brings_counts(addon, sheet):
+    from headshop.headshop_addon import shown_objects
+
+    bpy = addon
+    material = sheet.data.materials[0]
+    sheet.data.materials[0] = bpy.data.materials.new("Plain")
+    nodes = bpy.data.node_groups.new("Dressed", "GeometryNodeTree")
+    for way in ("INPUT", "OUTPUT"):
+        nodes.interface.new_socket("Geometry", in_out=way, socket_type="NodeSocketGeometry")
+    start, end = nodes.nodes.new("NodeGroupInput"), nodes.nodes.new("NodeGroupOutput")
+    dress = nodes.nodes.new("GeometryNodeSetMaterial")
+    dress.inputs["Material"].default_value = material
+    nodes.links.new(start.outputs[0], dress.inputs["Geometry"])
+    nodes.links.new(dress.outputs[0], end.inputs[0])
+    assert not has_pictures(shown_objects.as_one(bpy.context, [sheet])[0])
+    sheet.modifiers.new("Dressed", "NODES").node_group = nodes
+    mesh, _ = shown_objects.as_one(bpy.context, [sheet])
+    np.testing.assert_array_equal(mesh.pictures[mesh.material[0]], _sheet().pictures[0])
+
+
 def test_a_head_is_dressed_in_the_pictures_of_its_scan(bpy, reference, monkeypatch):
     from headshop.headshop_addon import bridge, heads, materials, scan_texture
 

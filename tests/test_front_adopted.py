@@ -11,12 +11,9 @@ from headshop.sim.point_cloud.splats import COLOURS, OPACITY, SCALES, TURNS
 
 
 @pytest.fixture
-def original(addon, reference):
+def original(addon, skin_object):
     """The reference's skin as an object, selected and active."""
-    from headshop.headshop_addon import bridge
-
-    obj = bridge.mesh_to_object(reference.skin, "Raw")
-    addon.context.scene.collection.objects.link(obj)
+    obj = skin_object("Raw")
     addon.context.view_layer.objects.active = obj
     obj.select_set(True)
     return obj

@@ -10,15 +10,8 @@ from headshop.sim.anatomy.landmark_names import SKIN
 
 
 @pytest.fixture
-def scan(addon, reference):
-    """The reference skin as a scan object in the scene."""
-    from headshop.headshop_addon import bridge, scan_landmarks
-
-    obj = bridge.mesh_to_object(reference.skin, "Scan")
-    addon.context.scene.collection.objects.link(obj)
-    addon.context.scene.headshop.scan = obj
-    scan_landmarks.entries(obj)
-    return obj
+def scan(scan_object):
+    return scan_object
 
 
 def test_every_landmark_is_asked_for_once():

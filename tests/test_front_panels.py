@@ -92,14 +92,8 @@ def test_an_empty_scene_tells_where_to_start(addon):
 
 
 @pytest.fixture
-def scan(addon, reference):
-    from headshop.headshop_addon import bridge, scan_landmarks
-
-    obj = bridge.mesh_to_object(reference.skin, "Scan")
-    addon.context.scene.collection.objects.link(obj)
-    addon.context.scene.headshop.scan = obj
-    scan_landmarks.entries(obj)
-    return obj
+def scan(scan_object):
+    return scan_object
 
 
 def test_landmarks_are_counted_until_a_head_can_be_built(addon, scan, reference):
