@@ -23,7 +23,7 @@ def with_pictures(mesh: Mesh, obj: bpy.types.Object) -> Mesh:
     """
     if mesh.uv is None or mesh.material is None:
         return mesh
-    materials = [slot.material and slot.material.original for slot in obj.material_slots]
+    materials = [slot.material for slot in obj.material_slots]
     images = [None if material is None else image_of(material) for material in materials]
     read = {image: pixels_of(image) for image in dict.fromkeys(images) if image is not None}
     if all(pixels is None for pixels in read.values()):
