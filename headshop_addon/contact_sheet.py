@@ -83,8 +83,10 @@ def anatomy_tiles(skin: bpy.types.Object) -> list[Tile]:
     scan, fit, muscles = heads.scan_of(skin), report.get("fit", {}), heads.muscles_of(skin)
     tiles = []
     if scan is not None:
-        points = report.get("scan", {}).get("points")
-        came = f"made of {points:,} points" if points else f"{len(scan.data.polygons):,} triangles, as it came"
+        points, sheets = (report.get("scan", {}).get(what) for what in ("points", "sheets"))
+        came = f"{len(scan.data.polygons):,} triangles, as it came"
+        came = f"{sheets} sheets, laid onto each other" if sheets else came
+        came = f"made of {points:,} points" if points else came
         tiles.append(Tile("Scan", came, ("scan",)))
     near = f"{fit['mean_mm']:.2f} mm from the scan on average" if "mean_mm" in fit else "ready to act"
     tiles.append(Tile("Head", near, ("skin", "features")))

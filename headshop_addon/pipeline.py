@@ -65,7 +65,9 @@ def prepare_scan(raw: Mesh, landmarks=None, unit=None, up=None, seconds=None) ->
 
 
 def _upright(mesh, counts, found, unit, up, seconds):
+    apart = counts.pop("sheets_apart")
     report = counts | {
+        "sheets_apart_mm": apart * found.unit_scale,
         "unit": found.unit,
         "unit_scale": found.unit_scale,
         "unit_told": unit is not None,

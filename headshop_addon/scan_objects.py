@@ -100,7 +100,7 @@ def resize(scan: bpy.types.Object, factor: float) -> str:
     facts = heads.read_report(scan).get("scan", {})
     scale = factor * facts.get("unit_scale", 1.0)
     name = next((name for name, usual in UNITS.items() if abs(scale / usual - 1) < ROUNDED), BY_FACE)
-    facts |= {"unit": name, "unit_scale": scale}
+    facts |= {"unit": name, "unit_scale": scale, "sheets_apart_mm": factor * facts.get("sheets_apart_mm", 0.0)}
     facts["orientation"] = f"Read as {unit_words(facts['unit'], facts['unit_scale'])}."
     heads.write_report(scan, {"scan": facts})
     return "no person's size" if name == BY_FACE else f"it is in {unit_words(name, scale)}"
@@ -183,6 +183,8 @@ def summary(scan: bpy.types.Object) -> str:
     """A sentence about a scan that came in."""
     report = json.loads(scan.get(heads.REPORT, "{}")).get("scan", {})
     made = f", made of {report['points']:,} points" if report.get("points") else ""
+    if report.get("sheets"):
+        made += f", {report['sheets']} sheets laid onto each other"
     return f"{scan.name}: {len(scan.data.polygons):,} faces{made}. {report.get('orientation', '')}".strip()
 
 

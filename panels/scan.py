@@ -47,6 +47,9 @@ def _facts(layout, context, scan):
     column.label(text=f"{len(scan.data.polygons):,} faces, {size:.0f} mm", icon="MESH_DATA")
     if facts.get("points"):
         column.label(text=f"Made of {facts['points']:,} points", icon="OUTLINER_OB_POINTCLOUD")
+    if facts.get("sheets"):
+        told = f"{facts['sheets']} overlapping sheets, laid onto each other: {facts['sheets_apart_mm']:.1f} mm apart"
+        column.label(text=told, icon="MOD_BOOLEAN")
     if "unit" in facts:
         unit, axes = facts["unit"], f"{facts['up']} up, facing {facts['front']}"
         usual = unit in UNITS

@@ -74,6 +74,8 @@ def test_each_fault_is_removed_and_counted():
         "zero_area_faces": 2,
         "duplicate_faces": 2,
         "turned_faces": 0,
+        "sheets": 0,
+        "sheets_apart": 0.0,
         "unused_vertices": 2,  # the lone point and the middle of the line
         "vertices": n + 3,
         "triangles": len(triangles) + 1,

@@ -13,6 +13,7 @@ from ..point_cloud.meshed import meshing
 from ..progress import Progress, Work, finish, portion
 from .strays import stray_vertices
 from .texture import has_pictures, triangle_corners
+from .views import laying_together
 from .winding import wound_alike
 
 #: Fewer triangles than this are no head.
@@ -32,12 +33,14 @@ def clean_scan(mesh: Mesh) -> tuple[Mesh, dict]:
 
 def cleaning(mesh: Mesh) -> Work:
     """Work returning a triangle mesh without NaN vertices, zero-area, duplicate faces and unused vertices; equal ones welded,
-    neighbours wound the same way round. Points without faces become a mesh first (`point_cloud.meshing`).
+    neighbours wound the same way round, and views that overlap laid onto each other (`views`). Points without faces become a
+    mesh first (`point_cloud.meshing`).
 
     It returns the mesh (colours kept: the mean of those welded; pictures too) and counts: ``vertices``, ``triangles``,
     ``components`` of the result, ``points`` that it was made of (0: it had faces), what was removed: ``nonfinite_vertices``,
     ``nonfinite_faces``, ``welded_vertices``, ``stray_vertices`` with the faces at them, ``zero_area_faces``,
-    ``duplicate_faces``, ``unused_vertices``, and the ``turned_faces``.
+    ``duplicate_faces``, ``unused_vertices``, the ``turned_faces``, and how many ``sheets`` were laid onto each other, that were
+    ``sheets_apart``.
 
     Raises
     ------
@@ -109,11 +112,17 @@ def _cleaning(mesh, counts):
     counts["turned_faces"] = int(turned.sum())
     triangles[turned] = triangles[turned, ::-1]
     yield Progress(0.9, "Cleaning the scan")
-    counts |= {
-        "vertices": len(points),
-        "triangles": len(triangles),
-        "components": components(triangles, len(points))[0],
-    }
+    pieces, label = components(triangles, len(points))
+    laying = laying_together(points, triangles, label)
+    points, once, counts["sheets"], counts["sheets_apart"] = yield from portion(laying, 0.9, 1.0)
+    if not once.all():
+        triangles, rows, turned = triangles[once], rows[once], turned[once]
+        kept = np.zeros(len(points), dtype=bool)
+        kept[triangles.ravel()] = True
+        triangles = (np.cumsum(kept) - 1)[triangles]
+        points, colour = points[kept], None if colour is None else colour[kept]
+        pieces = components(triangles, len(points))[0]
+    counts |= {"vertices": len(points), "triangles": len(triangles), "components": pieces}
     clean = replace(Mesh.from_triangles(points, triangles), colour=colour)
     return _with_pictures(clean, mesh, rows, turned), counts
 
