@@ -12,6 +12,18 @@ def scan(context) -> bpy.types.Object | None:
     return chosen if chosen is not None and chosen.name in context.scene.objects else None
 
 
+def other_scan(context) -> bpy.types.Object | None:
+    """The active object, if it is a scan that is not the chosen one."""
+    there = context.active_object
+    is_scan = there is not None and there.type == "MESH" and there.get(heads.PART) == "scan"
+    return there if is_scan and there.select_get() and there != scan(context) else None
+
+
+def scans(context) -> list[bpy.types.Object]:
+    """All scans in the scene."""
+    return [obj for obj in context.scene.objects if obj.get(heads.PART) == "scan"]
+
+
 def skin(context) -> bpy.types.Object | None:
     """The skin of the head in question: the active object's, the one chosen in the sidebar, or the only one."""
     found = heads.skin_of(getattr(context, "active_object", None))

@@ -89,6 +89,23 @@ def shown_mesh(obj: bpy.types.Object, graph: bpy.types.Depsgraph) -> Mesh:
         shown.to_mesh_clear()
 
 
+def scan_mesh(scan: bpy.types.Object) -> Mesh:
+    """The mesh of a ``scan``, mm in its local space, as clicks meet it: with modifiers and shape keys that an artist gave it.
+
+    A hidden one is shown while it is read: what is hidden has no modifiers.
+    """
+    if not scan.modifiers and scan.data.shape_keys is None:
+        return object_to_mesh(scan)
+    hidden = scan.hide_viewport, scan.hide_get()
+    scan.hide_viewport = False
+    scan.hide_set(False)
+    try:
+        return shown_mesh(scan, bpy.context.evaluated_depsgraph_get())
+    finally:
+        scan.hide_viewport = hidden[0]
+        scan.hide_set(hidden[1])
+
+
 def read_numbers(data: bpy.types.Mesh | bpy.types.PointCloud) -> dict[str, np.ndarray]:
     """Name -> (n,) float32: the attributes of vertices or points that are a number each."""
     kept = [a for a in data.attributes if a.data_type == "FLOAT" and a.domain == "POINT"]

@@ -158,6 +158,11 @@ def scan_of(skin: bpy.types.Object) -> bpy.types.Object | None:
     return scan if isinstance(scan, bpy.types.Object) else None
 
 
+def built_from(scene: bpy.types.Scene, scan: bpy.types.Object) -> list[bpy.types.Object]:
+    """The skins of the heads in ``scene`` that were made from ``scan``."""
+    return [skin for skin in find_heads(scene) if scan_of(skin) == scan]
+
+
 def _objects_of(skin):
     children = list(skin.children)
     pointers = skin.get(_POINTERS)

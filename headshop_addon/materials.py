@@ -97,7 +97,7 @@ def _coloured_scan(skin: bpy.types.Object) -> Mesh | None:
     if scan is None:
         return None
     bpy.context.view_layer.update()  # matrix_world of objects that were just made
-    seen = with_pictures(bridge.object_to_mesh(scan), scan)
+    seen = with_pictures(bridge.scan_mesh(scan), scan)
     if seen.colour is None or not len(seen.faces):
         return None
     matrix = np.array(skin.matrix_world.inverted() @ scan.matrix_world)

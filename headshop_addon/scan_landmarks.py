@@ -55,6 +55,12 @@ def forget(scan, *names: str) -> None:
             item.state, item.confidence, item.mid_air = "MISSING", 0.0, False
 
 
+def leave_out(scan, name: str) -> None:
+    """Let a landmark count for nothing where a head is built; where the others let expect it is shown."""
+    forget(scan, name)
+    follow(scan)
+
+
 def replace(scan, placed: dict, confidence: dict | None = None) -> None:
     """Forget all landmarks, place the given ones (mm) and let the others follow.
 
@@ -163,14 +169,15 @@ def most_useful(scan) -> list[str]:
 
 def snapshot(scan) -> tuple:
     """All landmarks as they are, for `restore`."""
-    return tuple((item.name, tuple(item.co), item.state) for item in entries(scan).values())
+    return tuple((i.name, tuple(i.co), i.state, i.confidence, i.mid_air) for i in entries(scan).values())
 
 
 def restore(scan, taken: tuple) -> None:
     """Put back what `snapshot` took."""
     stored = entries(scan)
-    for name, co, state in taken:
-        stored[name].co, stored[name].state = co, state
+    for name, co, state, confidence, mid_air in taken:
+        item = stored[name]
+        item.co, item.state, item.confidence, item.mid_air = co, state, confidence, mid_air
 
 
 def next_to_place(scan, skipped=(), chosen: str | None = None) -> str | None:

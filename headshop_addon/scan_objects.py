@@ -18,8 +18,8 @@ from ..sim.errors import InputError
 from ..sim.landmarks.find import FoundLandmarks
 from ..sim.progress import Work, finish
 from ..sim.scan.orientation import FOUND, Orientation, axis_names, detect, read_as
-from ..sim.scan.units import BY_FACE, UNITS, USUAL, unit_words
-from . import active, bridge, heads, pipeline, scan_landmarks
+from ..sim.scan.units import BY_FACE, PLAUSIBLE, UNITS, USUAL, unit_words
+from . import active, bridge, heads, heat_map, pipeline, scan_landmarks
 from .shown_objects import as_one
 
 TURN = "headshop_turn"
@@ -52,22 +52,37 @@ def adopt(context, originals: list[bpy.types.Object]) -> Work:
     """Work that makes a clean, upright copy of meshes or point clouds the scan, in their place, and hides those; returns it.
 
     It is what the viewport shows: with modifiers and shape keys, and as wide, high, deep or mirrored as scales make it. It is
-    called after the first, and stands as that does.
+    called after the first, and stands as that does. Its unit is told by its numbers before the first's scale, as those are of a
+    file, or, where they are no head's, by the size that it has in the scene.
 
     Raises
     ------
     InputError : they are no head (`sim.scan.clean`, `sim.scan.orientation`), or the first is scaled to nothing.
     """
     mesh, place = as_one(context, originals)
-    scan = yield from pipeline.prepare_scan(mesh)
+    factor = bridge.METRES * _scale_that_tells(mesh, place)  # importers put the numbers of a file, in whatever unit
+    scan = yield from pipeline.prepare_scan(mesh.moved(mesh.vertices * factor))
     obj = _add(context, scan, f"{originals[0].name} Scan")
-    turn = scan.orientation.matrix  # mm to mm here: the translation is zero, so it serves for metres too
+    turn = factor * scan.orientation.matrix  # mm to mm: the translation is zero, so it serves for metres too
+    turn[3, 3] = 1.0
     obj.matrix_world = place @ Matrix(np.linalg.inv(turn).tolist())
     obj[IN_PLACE] = True
     for original in originals:
         original.hide_set(True)
     look_at(context)
     return obj
+
+
+def _scale_that_tells(mesh, place) -> float:
+    """By which the numbers of ``mesh`` are multiplied to tell their unit: 1 where they are a head's in some metric unit, as
+    those of a file are whatever an artist has scaled it by; else by what they are scaled in the scene, if a head is shown."""
+    scale = abs(place.determinant()) ** (1 / 3)
+    extent = bridge.METRES * np.ptp(mesh.vertices, axis=0).max() if len(mesh.vertices) else 0.0
+    metric = [unit for name, unit in UNITS.items() if name != "in"]
+    own, shown = (
+        any(PLAUSIBLE[0] < size * unit < PLAUSIBLE[1] for unit in metric) for size in (extent, scale * extent)
+    )
+    return scale if shown and not own else 1.0
 
 
 def _add(context, scan, name: str) -> bpy.types.Object:
@@ -116,7 +131,7 @@ def stand_upright(scan: bpy.types.Object, found: FoundLandmarks) -> FoundLandmar
     facts = heads.read_report(scan).get("scan", {})
     if facts.get("up_told", True):
         return found
-    turn = detect(bridge.object_to_mesh(scan), found.positions, unit=1.0, called=facts["unit"]).rotation
+    turn = detect(bridge.scan_mesh(scan), found.positions, unit=1.0, called=facts["unit"]).rotation
     if np.allclose(turn, np.eye(3)):
         return found
     matrix = Matrix(turn.tolist()).to_4x4()
@@ -231,7 +246,7 @@ def build(context, scan: bpy.types.Object, name: str = "") -> Work:
     if len(placed) < scan_landmarks.ENOUGH_TO_BUILD:
         raise InputError(f"{scan.name} has {len(placed)} landmarks: place at least {scan_landmarks.ENOUGH_TO_BUILD}.")
     report = json.loads(scan.get(heads.REPORT, "{}")).get("scan", {})
-    prepared = pipeline.Scan(bridge.object_to_mesh(scan), _upright(), report)
+    prepared = pipeline.Scan(bridge.scan_mesh(scan), _upright(), report)
     skin, report = yield from pipeline.build(
         prepared,
         placed,
@@ -244,9 +259,24 @@ def build(context, scan: bpy.types.Object, name: str = "") -> Work:
     )
     skin.matrix_world = scan.matrix_world
     scan.hide_viewport = True
+    _take_over(context.scene, scan, skin)
     muscles = active.muscles_collection(skin)
     if muscles is not None:
         muscles.hide_viewport = True  # they stay where they are when the face moves
     context.scene.headshop.head = skin
     select(context, skin)
     return skin, report
+
+
+def _take_over(scene, scan, skin) -> None:
+    """Let the head of ``skin`` stand where others of its ``scan`` did, which are hidden, and show its fit if theirs was shown:
+    the colours that show one head's fit are no colours of another."""
+    shown = [other for other in heads.find_heads(scene) if other != skin and other.headshop.show_fit]
+    for other in shown:
+        other.headshop.show_fit = False
+    if shown and heat_map.has_fit(skin):
+        skin.headshop.show_fit = True
+    for other in heads.built_from(scene, scan):
+        collection = heads.head_collection(other)
+        if other != skin and collection is not None:
+            collection.hide_viewport = collection.hide_render = True

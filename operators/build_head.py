@@ -3,7 +3,7 @@
 
 import bpy
 
-from ..headshop_addon import active, polls, scan_landmarks
+from ..headshop_addon import active, heads, polls, scan_landmarks
 from ..headshop_addon.jobs import Job
 
 
@@ -16,7 +16,10 @@ class HEADSHOP_OT_build_head(Job, bpy.types.Operator):
     panel = "build"
 
     name: bpy.props.StringProperty(
-        name="Name", description="Name of the head; empty: the scan's", options={"SKIP_SAVE"}
+        # Hidden: typing a name after a build would build again, with the window frozen.
+        name="Name",
+        description="Name of the head; empty: the scan's",
+        options={"SKIP_SAVE", "HIDDEN"},
     )
 
     @classmethod
@@ -40,4 +43,6 @@ class HEADSHOP_OT_build_head(Job, bpy.types.Operator):
         """Make the head the one the sidebar works on."""
         skin, report = result
         fit = report["fit"]
-        return f"{skin.name}: mean distance to the scan {fit['mean_mm']:.2f} mm"
+        said = f"{skin.name}: mean distance to the scan {fit['mean_mm']:.2f} mm"
+        others = [heads.head_name(s) for s in heads.built_from(context.scene, active.scan(context)) if s != skin]
+        return said + "".join(f"; {other}, built before from this scan, is hidden" for other in others[-1:])

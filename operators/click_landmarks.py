@@ -3,12 +3,13 @@
 
 import bpy
 
-from ..headshop_addon import active, bridge, dependencies, landmark_overlay, picking
+from ..headshop_addon import active, bridge, heads, landmark_overlay, picking, polls
 from ..headshop_addon import scan_landmarks as landmarks
 from ..headshop_addon.bridge import METRES
 from ..sim.anatomy.landmark_names import label
 
 _SKIP = {"RIGHTMOUSE", "N"}
+_LEAVE_OUT = {"X", "DEL"}  # by which Blender deletes the selected objects
 _END = {"ESC", "RET", "NUMPAD_ENTER"}
 
 
@@ -31,13 +32,7 @@ class HEADSHOP_OT_click_landmarks(bpy.types.Operator):
     @classmethod
     def poll(cls, context):
         """Needs a scan and the warp."""
-        if active.scan(context) is None:
-            cls.poll_message_set("Import a scan first")
-            return False
-        if reason := dependencies.reason("scipy"):
-            cls.poll_message_set(reason)
-            return False
-        return True
+        return polls.scan(cls, context) and polls.library(cls, "scipy") and polls.object_mode(cls, context)
 
     def execute(self, context):
         """Clicking needs a window."""
@@ -62,14 +57,18 @@ class HEADSHOP_OT_click_landmarks(bpy.types.Operator):
             self.report({"INFO"}, "All landmarks are placed: choose one in the list to place it anew.")
             return {"CANCELLED"}
         context.scene.headshop.show_landmarks = True
-        self._scan.hide_viewport = False  # it is hidden once a head was built from it
+        self._show_alone(context)
         context.window.cursor_modal_set("CROSSHAIR")
         context.window_manager.modal_handler_add(self)
         self._ask(context)
         return {"RUNNING_MODAL"}
 
     def modal(self, context, event):
-        """Click places, Ctrl-Z takes back, N or the right button skips, Esc or Enter ends; the view can be turned."""
+        """Click places, Ctrl-Z takes back, N or the right button skips, X leaves out, Esc or Enter ends; the view can turn."""
+        if not self._can_go_on(context):
+            self._finish(context)
+            self.report({"WARNING"}, "Clicking landmarks has ended: the scan is gone, or being edited.")
+            return {"FINISHED"}
         if event.type in _END and event.value == "PRESS":
             return self._end(context)
         if event.type == "Z" and (event.ctrl or event.oskey) and event.value == "PRESS":
@@ -87,13 +86,37 @@ class HEADSHOP_OT_click_landmarks(bpy.types.Operator):
             self._skipped.append(self._name)
             self._chosen = None
             return self._end(context) if self.start else self._ask(context)
-        if event.type in {"LEFTMOUSE", "RIGHTMOUSE", "Z"}:
+        if event.type in _LEAVE_OUT and event.value == "PRESS":
+            self._remember()
+            landmarks.leave_out(self._scan, self._name)
+            self._skipped.append(self._name)
+            self._chosen = None
+            return self._end(context) if self.start else self._ask(context)
+        if event.type in {"LEFTMOUSE", "RIGHTMOUSE", "Z", *_LEAVE_OUT}:
             return {"RUNNING_MODAL"}
         return {"PASS_THROUGH"}
 
     def cancel(self, context):
         """Blender closes the window."""
         self._finish(context)
+
+    def _show_alone(self, context):
+        """The scan is hidden once a head was built from it: it is shown, and such heads are not, until clicking ends."""
+        scan = self._scan
+        self._hidden = scan.hide_viewport
+        scan.hide_viewport = False
+        scan.hide_set(False)
+        collections = map(heads.head_collection, heads.built_from(context.scene, scan))
+        self._covered = [c.name for c in collections if c is not None and not c.hide_viewport]
+        for name in self._covered:
+            bpy.data.collections[name].hide_viewport = True
+
+    def _can_go_on(self, context) -> bool:
+        """Whether the scan is still there, as an object."""
+        try:
+            return context.mode == "OBJECT" and context.scene.objects.get(self._scan.name) == self._scan
+        except ReferenceError:
+            return False
 
     def _click(self, context, region, at):
         hit = picking.on_surface(context, self._area, region, at, self._scan, self._specks)
@@ -123,13 +146,17 @@ class HEADSHOP_OT_click_landmarks(bpy.types.Operator):
         landmark_overlay.asked_for = self._name
         count = len(landmarks.positions(self._scan))
         self._area.header_text_set(f"Click {self._name}: {label(self._name)}   ({count} placed)")
-        context.workspace.status_text_set(
-            f"Click {self._name}   |   N or right click: skip   |   Ctrl Z: take back   |   Esc or Enter: end and keep"
-        )
+        keys = "N or right click: skip   |   X: leave out   |   Ctrl Z: take back   |   Esc or Enter: end and keep"
+        context.workspace.status_text_set(f"Click {self._name}   |   {keys}")
         self._area.tag_redraw()
         return {"RUNNING_MODAL"}
 
     def _finish(self, context):
+        for name in self._covered:
+            if name in bpy.data.collections:
+                bpy.data.collections[name].hide_viewport = False
+        if self._covered and self._can_go_on(context):
+            self._scan.hide_viewport = self._hidden
         landmark_overlay.asked_for = ""
         self._area.header_text_set(None)
         self._area.tag_redraw()
@@ -141,5 +168,5 @@ class HEADSHOP_OT_click_landmarks(bpy.types.Operator):
         if landmarks.snapshot(self._scan) == self._before:
             return {"CANCELLED"}
         count = len(landmarks.positions(self._scan))
-        self.report({"INFO"}, f"{count} landmarks placed on {self._scan.name}")
+        self.report({"INFO"}, f"{count} landmark{'s' * (count != 1)} placed on {self._scan.name}")
         return {"FINISHED"}

@@ -28,7 +28,7 @@ class HEADSHOP_OT_find_landmarks(Job, bpy.types.Operator):
         self._scan = active.scan(context)
         any_size = not scan_objects.unit_is_told(self._scan)
         usual = scan_objects.usual_scales(self._scan)
-        return (yield from find_landmarks(bridge.object_to_mesh(self._scan), any_size=any_size, usual=usual))
+        return (yield from find_landmarks(bridge.scan_mesh(self._scan), any_size=any_size, usual=usual))
 
     def finish(self, context, result):
         """Store them on the scan, which is brought to a person's size if it is in no unit, and set upright."""

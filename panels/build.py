@@ -32,7 +32,7 @@ class HEADSHOP_PT_build(SidebarPanel, bpy.types.Panel):
             hint(layout, context, "A head is built from a scan with landmarks.")
         elif scan is not None and len(scan_landmarks.to_build(scan)) < scan_landmarks.ENOUGH_TO_BUILD:
             hint(layout, context, "Find the landmarks of the scan first, or click at least four.")
-        elif skin is None:
+        elif skin is None and context.mode == "OBJECT":
             hint(layout, context, "Ready to build.", "CHECKMARK")
         if skin is not None:
             _result(layout, context, skin)

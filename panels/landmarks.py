@@ -102,7 +102,10 @@ class HEADSHOP_PT_landmark_list(SidebarPanel, bpy.types.Panel):
         if 0 <= group.landmark_index < len(group.landmarks):
             name = group.landmarks[group.landmark_index].name
             hint(layout, context, label(name).capitalize() + ".")
-            layout.operator("headshop.click_landmarks", text=f"Place {name}", icon="RESTRICT_SELECT_OFF").start = name
+            row = layout.row(align=True)
+            row.operator("headshop.click_landmarks", text=f"Place {name}", icon="RESTRICT_SELECT_OFF").start = name
+            if group.landmarks[group.landmark_index].state in ("PLACED", "FOUND"):
+                row.operator("headshop.clear_landmarks", text="Leave Out", icon="X").name = name
 
 
 def classes():

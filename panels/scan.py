@@ -30,10 +30,12 @@ class HEADSHOP_PT_scan(SidebarPanel, bpy.types.Panel):
         row.operator("headshop.make_sample", icon="USER")
         row.operator("headshop.choose_scan", text="Use Selected", icon="RESTRICT_SELECT_OFF")
         scan = active.scan(context)
-        if scan is None:
+        if scan is not None or active.scans(context):
+            layout.prop(settings, "scan", text="")
+        elif scan is None:
             hint(layout, context, "Start here: import the scan of a head, or add the sample to try things out.")
+        if scan is None:
             return
-        layout.prop(settings, "scan", text="")
         _facts(layout, context, scan)
 
 

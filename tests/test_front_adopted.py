@@ -28,7 +28,7 @@ def adopted(addon, monkeypatch):
 
     def upright(mesh, *_, **__):
         yield Progress(0.5, "")
-        return Orientation("mm", 1.0, "+Z", "-Y", np.eye(3), True, "As it is.")
+        return Orientation("m", 1000.0, "+Z", "-Y", np.eye(3), True, "As it is.")
 
     def make():
         assert addon.ops.headshop.choose_scan() == {"FINISHED"}
@@ -106,7 +106,7 @@ def test_without_a_selection_the_active_object_is_the_scan(original, adopted, ad
     addon.context.scene.collection.objects.link(other)
     other.select_set(True)
     assert adopted().name == "Raw Scan"
-    assert not addon.ops.headshop.choose_scan.poll()  # a scan is none to choose
+    assert not addon.ops.headshop.choose_scan.poll()  # it is chosen already
 
 
 def test_a_scale_of_its_own_in_each_direction_is_the_scans_shape(original, adopted, reference):
@@ -171,3 +171,39 @@ def test_what_is_scaled_to_nothing_is_refused(addon, original):
     ):
         addon.ops.headshop.choose_scan()
     assert addon.context.scene.headshop.scan is None and not original.hide_get()
+
+
+@pytest.mark.parametrize(
+    "unit, scale", [("mm", 1.0), ("mm", 0.001), ("mm", 0.01), ("cm", 1.0), ("m", 3.0), ("dm", 0.1)]
+)
+def test_the_unit_is_told_by_what_is_shown_or_else_by_the_numbers(addon, original, reference, unit, scale):
+    """Importers put the numbers of a file as metres, and artists scale what comes in or not: a head is as large as it was."""
+    from headshop.headshop_addon import heads
+
+    factor = {"mm": 1000.0, "cm": 100.0, "dm": 10.0, "m": 1.0}[unit]
+    original.data.vertices.foreach_set("co", (reference.skin.vertices * 1e-3 * factor).astype(np.float32).ravel())
+    original.scale, original.rotation_euler, original.location = (scale,) * 3, (0.0, 0.0, np.pi / 2), (1, 2, 3)
+    shown = _world(original)
+    assert addon.ops.headshop.choose_scan() == {"FINISHED"}
+    scan = addon.context.scene.headshop.scan
+    facts = json.loads(scan[heads.REPORT])["scan"]
+    assert facts["unit"] in ("mm", "cm", "m") and facts["certain"]
+    extent = np.ptp(reference.skin.vertices, axis=0)
+    assert np.ptp(_own(scan).vertices, axis=0) == pytest.approx(extent, rel=1e-4)
+    assert np.abs(_world(scan) - shown).max() < 1e-5 * np.abs(shown).max()
+
+
+def test_another_scan_is_chosen_with_its_landmarks(addon, scan_object, skin_object, reference):
+    """The one that was chosen was deleted: what else there is can be chosen again, and its landmarks with it."""
+    from headshop.headshop_addon import active, heads, scan_landmarks
+
+    scan_object[heads.PART] = "scan"
+    scan_landmarks.replace(scan_object, reference.landmark_positions())
+    addon.context.scene.headshop.scan = None
+    assert active.scan(addon.context) is None and active.scans(addon.context) == [scan_object]
+    addon.context.view_layer.objects.active = scan_object
+    scan_object.select_set(True)
+    assert addon.ops.headshop.choose_scan.poll() and addon.ops.headshop.choose_scan() == {"FINISHED"}
+    assert active.scan(addon.context) == scan_object and not scan_object.hide_get()
+    assert len(scan_landmarks.positions(scan_object)) == len(reference.landmark_positions())
+    assert not addon.ops.headshop.choose_scan.poll() and len(active.scans(addon.context)) == 1

@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What clicking landmarks shows and hides, what it leaves out, and what ends it; without a window."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+
+@pytest.fixture
+def clicks(addon, scan_object):
+    """The operator's methods on an object of Python's own, begun on the scan; ``said`` is what it reported."""
+    from headshop.operators.click_landmarks import HEADSHOP_OT_click_landmarks as Operator  # noqa: N813
+
+    methods = {name: item for name, item in vars(Operator).items() if callable(item)}
+    out = type("Clicks", (), methods)()
+    out.said = []
+    out.report = lambda kind, text: out.said.append(text)
+    out._area = SimpleNamespace(header_text_set=lambda _: None, tag_redraw=lambda: None)
+    out._scan, out._steps, out._skipped, out._chosen, out.start = scan_object, [], [], None, ""
+    return out
+
+
+@pytest.fixture
+def context(addon):
+    """Blender's context with a window that shows nothing."""
+    nothing = SimpleNamespace(cursor_modal_restore=lambda: None, status_text_set=lambda _: None)
+    there = addon.context
+    return SimpleNamespace(
+        scene=there.scene, mode="OBJECT", window=nothing, workspace=nothing, view_layer=there.view_layer
+    )
+
+
+def _press(key, **more):
+    return SimpleNamespace(type=key, value="PRESS", **({"ctrl": False, "oskey": False} | more))
+
+
+def test_the_head_gives_way_to_its_scan_and_comes_back(clicks, context, reference):
+    from headshop.headshop_addon import heads
+
+    collection = heads.create_head(reference, "Ref", clicks._scan)
+    other = heads.create_head(reference, "Other")
+    clicks._scan.hide_viewport = True
+    clicks._scan.hide_set(True)
+    clicks._show_alone(context)
+    assert not clicks._scan.hide_viewport and not clicks._scan.hide_get()
+    assert collection.hide_viewport and not other.hide_viewport
+    clicks._finish(context)
+    assert clicks._scan.hide_viewport and not collection.hide_viewport and not other.hide_viewport
+
+
+def test_a_scan_without_a_head_stays_shown(clicks, context):
+    clicks._scan.hide_viewport = True
+    clicks._show_alone(context)
+    clicks._finish(context)
+    assert not clicks._scan.hide_viewport
+
+
+@pytest.mark.parametrize("key", ["X", "DEL"])
+def test_a_landmark_is_left_out_and_taken_back(clicks, context, reference, key):
+    from headshop.headshop_addon import scan_landmarks
+
+    truth = reference.landmark_positions()
+    scan_landmarks.replace(clicks._scan, truth, dict.fromkeys(truth, 0.9))
+    clicks._show_alone(context)
+    clicks._ask(context)
+    name, before = clicks._name, scan_landmarks.snapshot(clicks._scan)
+    assert clicks.modal(context, _press(key)) == {"RUNNING_MODAL"}
+    assert name not in scan_landmarks.to_build(clicks._scan) and clicks._name != name
+    assert name in scan_landmarks.positions(clicks._scan, "DERIVED")
+    clicks.modal(context, _press("Z", ctrl=True))
+    assert scan_landmarks.snapshot(clicks._scan) == before and name in scan_landmarks.to_build(clicks._scan)
+
+
+def test_clicking_ends_where_the_scan_is_deleted_or_edited(clicks, context, addon):
+    clicks._show_alone(context)
+    clicks._name = "prn"
+    context.mode = "EDIT_MESH"
+    assert clicks.modal(context, _press("LEFTMOUSE")) == {"FINISHED"} and "being edited" in clicks.said[-1]
+    context.mode = "OBJECT"
+    addon.data.objects.remove(clicks._scan)
+    assert clicks.modal(context, _press("LEFTMOUSE")) == {"FINISHED"} and len(clicks.said) == 2
+
+
+def test_it_does_not_begin_in_edit_mode(addon, scan_object):
+    addon.context.view_layer.objects.active = scan_object
+    assert addon.ops.headshop.click_landmarks.poll()
+    addon.ops.object.mode_set(mode="EDIT")
+    assert not addon.ops.headshop.click_landmarks.poll()
+    addon.ops.object.mode_set(mode="OBJECT")
+
+
+def test_one_landmark_is_left_out_by_a_button(addon, scan_object, reference):
+    from headshop.headshop_addon import scan_landmarks
+
+    scan_landmarks.replace(scan_object, reference.landmark_positions())
+    assert addon.ops.headshop.clear_landmarks(name="ch_r") == {"FINISHED"}
+    assert set(reference.landmark_positions()) - set(scan_landmarks.to_build(scan_object)) == {"ch_r"}
+    off = scan_landmarks.positions(scan_object, "DERIVED")["ch_r"] - reference.landmark_positions()["ch_r"]
+    assert np.linalg.norm(off) < 3.0
+    with pytest.raises(RuntimeError, match="There is no landmark 'nose'"):
+        addon.ops.headshop.clear_landmarks(name="nose")
+    assert addon.ops.headshop.clear_landmarks() == {"FINISHED"} and not scan_landmarks.to_build(scan_object)
