@@ -44,5 +44,7 @@ class HEADSHOP_OT_build_head(Job, bpy.types.Operator):
         skin, report = result
         fit = report["fit"]
         said = f"{skin.name}: mean distance to the scan {fit['mean_mm']:.2f} mm"
+        if fit.get("doubted_mm"):
+            said += f"; check {', '.join(fit['doubted_mm'])}, far from where the scan seems to have it"
         others = [heads.head_name(s) for s in heads.built_from(context.scene, active.scan(context)) if s != skin]
         return said + "".join(f"; {other}, built before from this scan, is hidden" for other in others[-1:])

@@ -163,6 +163,10 @@ def test_lips_stay_together_and_lids_on_the_eyes(reference, built):
         assert height.min() > 0 and height.max() < 5
 
 
+def test_no_landmark_of_its_own_is_doubted(built):
+    assert built[0].fit["doubted_mm"] == {} and built[0].fit["advice"] is None
+
+
 def test_bone_lies_inside(built):
     result, _ = built
     head = result.head

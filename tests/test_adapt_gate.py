@@ -6,12 +6,14 @@ import pytest
 
 from headshop.sim.adapt.arrangement import Faces
 from headshop.sim.adapt.closest import Surface
+from headshop.sim.adapt.fit_sentence import doubts
 from headshop.sim.adapt.gate import (
     check_against_scan,
     check_arrangement,
     check_likeness,
     check_on_face,
     check_on_surface,
+    doubted,
 )
 from headshop.sim.adapt.landmarks import read_landmarks
 from headshop.sim.adapt.relief import face_likeness
@@ -208,3 +210,25 @@ def test_a_ball_is_no_face(reference):
     ball = 95 * skin.vertices / np.linalg.norm(skin.vertices, axis=1, keepdims=True)
     assert "no face" in _refusal(check_likeness, reference, ball, fitted)
     assert np.isnan(face_likeness(reference, ball, np.zeros(len(fitted))))
+
+
+@pytest.mark.parametrize("name", ["lps_infinite", "menpo_james"])
+def test_a_landmark_elsewhere_on_the_face_is_doubted_and_their_own_are_not(people, reference, name):
+    """A corner of the mouth on the cheek, where the others do not exclude it."""
+    surface, marks = people[name]
+    aside = marks["ch_r"] + 16 * (marks["go_r"] - marks["ch_r"]) / np.linalg.norm(marks["go_r"] - marks["ch_r"])
+    wrong = marks | {"ch_r": surface.closest(aside[None]).points[0]}
+    _check(reference, surface, wrong)
+    look = finish(first_look(reference, Surface(surface.vertices, surface.triangles, 2.0), wrong))
+    assert doubted(marks, look.laid) == {}
+    told = doubted(wrong, look.laid)
+    assert list(told) == ["ch_r"] and 11 < told["ch_r"] < 22
+
+
+def test_what_is_said_of_doubted_landmarks():
+    laid = {name: np.zeros(3) for name in ("ch_r", "gn", "sn", "sto", "pra_l")}
+    off = {"ch_r": 19.2, "gn": 13.0, "sn": 11.0, "sto": 40.0, "pra_l": 40.0, "v": 90.0}
+    told = doubted({name: np.array([away, 0.0, 0.0]) for name, away in off.items()}, laid)
+    assert told == {"ch_r": 19.2, "sn": 11.0}, "chins are less sure, middles of parted lips and ears tell nothing"
+    assert doubts({}) == "" and doubts({"sn": 11.0}).startswith("Check sn: it lies 11 mm from where the face")
+    assert doubts(told).startswith("Check ch_r (19 mm) and sn (11 mm): they lie so far")

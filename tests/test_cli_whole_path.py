@@ -134,7 +134,7 @@ def test_it_is_a_program(built):
 
 
 def test_the_file_opens_on_the_head(bpy, built):
-    bpy.ops.wm.open_mainfile(filepath=str(built / "baked.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(built / "head.blend"))
     areas = [area for screen in bpy.data.screens for area in screen.areas if area.type == "VIEW_3D"]
     assert areas and all(area.spaces.active.region_3d.view_distance < 1.5 for area in areas)
     assert bpy.context.scene.camera is not None

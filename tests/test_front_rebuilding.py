@@ -21,7 +21,8 @@ def built(addon, scan_object, reference, monkeypatch):
         yield Progress(0.5, "")
         make.of = scan.mesh
         collection = heads.create_head(reference, name, scan_object, scene=scene, attributes=attributes)
-        return next(obj for obj in collection.objects if heads.is_skin(obj)), {"fit": {"mean_mm": 0.1}}
+        skin = next(obj for obj in collection.objects if heads.is_skin(obj))
+        return skin, {"fit": {"mean_mm": 0.1, "doubted_mm": {"ch_r": 19.0}}}
 
     def make():
         assert addon.ops.headshop.build_head() == {"FINISHED"}
@@ -37,7 +38,8 @@ def test_the_head_before_is_hidden_and_said_to_be(built, reference, capfd):
 
     other = heads.create_head(reference, "Somebody")
     first, second = built(), built()
-    assert "is hidden" in capfd.readouterr().out
+    said = capfd.readouterr().out
+    assert "is hidden" in said and "check ch_r" in said
     assert heads.head_collection(first).hide_viewport and heads.head_collection(first).hide_render
     for collection in (heads.head_collection(second), other):
         assert not collection.hide_viewport and not collection.hide_render

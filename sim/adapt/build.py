@@ -17,9 +17,9 @@ from ..progress import Progress, Work, portion
 from ..relax.choice import kept_open, neutral_of, require_choice, smiles_closed
 from .bone import depth_under
 from .closest import Surface
-from .fit_sentence import MOST, SMILES_CLOSED, fit_sentence, fitted_shares, invented
+from .fit_sentence import MOST, SMILES_CLOSED, doubts, fit_sentence, fitted_shares, invented
 from .follow import follow
-from .gate import check_against_scan, check_arrangement, check_likeness, check_on_face, check_on_surface
+from .gate import check_against_scan, check_arrangement, check_likeness, check_on_face, check_on_surface, doubted
 from .landmarks import require_usable
 from .rest import BONES, rest_of
 from .scan_surface import near_head, to_leave_out, without_cuts, without_jumps
@@ -40,7 +40,8 @@ class BuildResult:
     head : the fitted head, in the scan's own place (mm)
     fit : mean_mm, p95_mm, max_mm (skin to scan, where the face has data), coverage (share of the face with data),
         landmark_mean_mm (given landmarks, but for those on a beard, to the skin's own), the share ``within_1mm``, what was
-        ``invented`` and the ``sentence`` that says all this; ``advice``, a sentence that says what else could be done, or None
+        ``invented`` and the ``sentence`` that says all this; ``doubted_mm``, of landmarks picked where the face in the scan
+        has them not, how far they are off; ``advice``, what else could be done, or None
     anatomy : muscles (count), skull_penetrations (bone vertices outside the skin), tissue_thickness_mm
     landmarks_missing : names of landmarks that were not given
     attributes : per skin vertex (n,) float32: ``fitted`` 0..1 (0: invented by the warp), ``distance_mm`` to the scan
@@ -97,7 +98,8 @@ def build_head(
     yield Progress(0.08, "Judging the landmarks")
     check_on_surface(given, target)
     look = yield from portion(first_look(reference, target, given, out, found, scan), 0.1, 0.3)
-    check_on_face({n: p for n, p in given.items() if n not in found}, look.laid, target)
+    picked = {n: p for n, p in given.items() if n not in found}
+    check_on_face(picked, look.laid, target)
     fit = yield from portion(fit_skin(reference, look.filled, look.landmarks, look.lips, found, look.guessed), 0.3, 0.6)
     fit = look.seen_only(fit)
     yield Progress(0.6, "Judging the fit")
@@ -121,7 +123,9 @@ def build_head(
         head, neutral = kept_open(fit.lips_closed, head, scanned, neutral.jaw), None
     report["relaxed"] = None if neutral is None else neutral.report
     told = relax == "auto" and neutral is None and shares.get("lips", 1.0) > MOST  # lips that are seen tell of a smile
-    report["advice"] = SMILES_CLOSED if told and smiles_closed(fit) else None
+    report["doubted_mm"] = doubted({n: p for n, p in picked.items() if n in look.landmarks}, look.laid)
+    smiles = SMILES_CLOSED if told and smiles_closed(fit) else ""
+    report["advice"] = " ".join(filter(None, (doubts(report["doubted_mm"]), smiles))) or None
     yield Progress(0.87, "Checking the anatomy")
     anatomy = anatomy_report(head)
     missing = tuple(n for n in SKIN if n not in given)

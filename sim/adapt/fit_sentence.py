@@ -36,6 +36,17 @@ FITTED = 0.3  # a vertex counts as fitted from here on
 MOST, ALL = 0.4, 0.1  # share of a region that was fitted, below which it counts as invented for the most part, wholly
 
 
+def doubts(doubted: dict[str, float]) -> str:
+    """What to say of landmarks that are so many mm from where the face in the scan has them (`gate.doubted`)."""
+    if not doubted:
+        return ""
+    if len(doubted) == 1:
+        ((name, away),) = doubted.items()
+        return f"Check {name}: it lies {away:.0f} mm from where the face in the scan seems to have it."
+    *some, last = [f"{name} ({away:.0f} mm)" for name, away in doubted.items()]
+    return f"Check {', '.join(some)} and {last}: they lie so far from where the face in the scan seems to have them."
+
+
 def fitted_shares(head: Head, fitted: np.ndarray) -> dict[str, float]:
     """Region, such as ``left ear`` or ``neck`` -> share of its visible area that the scan decided.
 
