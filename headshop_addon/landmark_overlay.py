@@ -15,6 +15,7 @@ from bpy_extras.view3d_utils import location_3d_to_region_2d
 from mathutils import Vector
 
 from . import active, scan_landmarks
+from .bridge import METRES
 from .preferences import preferences
 
 PLACED = (0.25, 0.85, 1.0, 1.0)
@@ -39,10 +40,11 @@ def points(context) -> list[tuple[str, str, Vector]]:
     if not settings.show_landmarks or scan is None or not scan.visible_get():
         return []
     matrix, mid_air = scan.matrix_world, scan_landmarks.in_mid_air(scan)
+    places = scan_landmarks.positions(scan, "DERIVED", "PLACED", "FOUND")
     return [
-        (i.name, "MID_AIR" if i.name in mid_air else i.state, matrix @ Vector(i.co))
+        (i.name, "MID_AIR" if i.name in mid_air else i.state, matrix @ Vector(places[i.name] * METRES))
         for i in scan.headshop.landmarks
-        if i.state != "MISSING"
+        if i.name in places
     ]
 
 

@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Landmarks kept on a scan object: read, place, forget, and let the rest follow those that were placed.
 
-Positions are stored in the scan object's own space (metres, like its mesh) and handed out in mm.
+Positions are stored in the scan object's own space (metres, like its mesh) and handed out in mm. Those handed out are where
+the mesh is now; those stored are brought there before anything is written (`mesh_follow`).
 """
 
 import numpy as np
 
 from ..sim.anatomy.landmark_names import SKIN
+from . import mesh_follow
 from .bridge import METRES
 
 #: The order in which they are asked for: first what fixes place, size and tilt, then what shapes the face most.
@@ -23,7 +25,8 @@ ENOUGH_TO_BUILD = 4
 
 
 def entries(scan) -> dict:
-    """Landmark name -> its property on the scan; makes those that are not there yet."""
+    """Landmark name -> its property on the scan; makes those that are not there yet and brings them to where the mesh is."""
+    mesh_follow.settle(scan)
     stored = scan.headshop.landmarks
     if len(stored) != len(SKIN):
         known = {item.name: (tuple(item.co), item.state) for item in stored}
@@ -38,7 +41,13 @@ def entries(scan) -> dict:
 def positions(scan, *states: str) -> dict[str, np.ndarray]:
     """Landmark -> (3,) mm of those in the given states; without any, of the placed ones."""
     states = states or ("PLACED",)
-    return {i.name: np.array(i.co, dtype=float) / METRES for i in scan.headshop.landmarks if i.state in states}
+    return _places(scan, {i.name: i.co for i in scan.headshop.landmarks if i.state in states})
+
+
+def _places(scan, stored: dict) -> dict[str, np.ndarray]:
+    """Name -> (3,) mm, where the mesh is now, of what is stored (3,) in the scan's own space."""
+    gone = mesh_follow.change(scan)
+    return {name: mesh_follow.moved(gone, np.array(co, dtype=float) / METRES) for name, co in stored.items()}
 
 
 def put(scan, name: str, position, state: str = "PLACED") -> None:
@@ -108,7 +117,7 @@ def take_found(scan, found) -> None:
 def found(scan) -> tuple[dict[str, np.ndarray], dict[str, float]]:
     """Where landmarks were found (mm) before any correction, and how surely, 0..1."""
     items = [item for item in scan.headshop.landmarks if item.confidence > 0]
-    return {i.name: np.array(i.found, dtype=float) / METRES for i in items}, {i.name: i.confidence for i in items}
+    return _places(scan, {i.name: i.found for i in items}), {i.name: i.confidence for i in items}
 
 
 def in_mid_air(scan) -> set[str]:

@@ -2,7 +2,8 @@
 """Scans as objects in the scene: brought in, adopted, given landmarks, made into heads.
 
 A scan object is always clean, in metres, upright and facing -Y in its own space; ``headshop_turn`` says by which
-rotation the axes of its file became these, so that landmark files stay in the file's axes.
+rotation the axes of its file became these, so that landmark files stay in the file's axes. Where an artist moves the mesh in
+that space, landmarks and axes go with it (`mesh_follow`).
 """
 
 import json
@@ -19,10 +20,10 @@ from ..sim.landmarks.find import FoundLandmarks
 from ..sim.progress import Work, finish
 from ..sim.scan.orientation import FOUND, Orientation, axis_names, detect, read_as
 from ..sim.scan.units import BY_FACE, PLAUSIBLE, UNITS, USUAL, unit_words
-from . import active, bridge, heads, heat_map, pipeline, scan_landmarks
+from . import active, bridge, heads, heat_map, mesh_follow, pipeline, scan_landmarks
+from .mesh_follow import TURN
 from .shown_objects import as_one
 
-TURN = "headshop_turn"
 IN_PLACE = "headshop_in_place"  # whether the scan stands in the place of an object that it was adopted from
 ROUNDED = 1e-6  # between two scales that are one
 
@@ -111,7 +112,10 @@ def usual_scales(scan: bpy.types.Object) -> list[float]:
 def resize(scan: bpy.types.Object, factor: float) -> str:
     """Make the ``scan``, which is of no known unit, ``factor`` times as large, with the landmarks on it; returns why, in a few
     words."""
-    _transform(scan, Matrix.Scale(factor, 4))
+    larger = np.diag([factor] * 3 + [1.0])
+    _transform(scan, larger)
+    axes = mesh_follow.file_axes(scan) @ np.linalg.inv(larger)  # what is a millimetre in its file grew as well
+    mesh_follow.write_file_axes(scan, axes)
     facts = heads.read_report(scan).get("scan", {})
     scale = factor * facts.get("unit_scale", 1.0)
     name = next((name for name, usual in UNITS.items() if abs(scale / usual - 1) < ROUNDED), BY_FACE)
@@ -134,12 +138,13 @@ def stand_upright(scan: bpy.types.Object, found: FoundLandmarks) -> FoundLandmar
     turn = detect(bridge.scan_mesh(scan), found.positions, unit=1.0, called=facts["unit"]).rotation
     if np.allclose(turn, np.eye(3)):
         return found
-    matrix = Matrix(turn.tolist()).to_4x4()
+    matrix = np.eye(4)
+    matrix[:3, :3] = turn
     _transform(scan, matrix)
     if scan.get(IN_PLACE):
-        scan.matrix_world = scan.matrix_world @ matrix.inverted()
-    whole = turn @ _rotation(scan)
-    scan[TURN] = whole.ravel().tolist()
+        scan.matrix_world = scan.matrix_world @ Matrix(matrix.T.tolist())
+    left, _, right = np.linalg.svd(mesh_follow.file_axes(scan)[:3, :3])
+    whole = left @ right  # the turn alone, without a scale that an artist applied
     up, front = axis_names(whole)
     said = f"{read_as(facts['unit'], facts['unit_scale'], whole)}: {FOUND} say so."
     facts |= {"up": up, "front": front, "rotation": whole.tolist(), "certain": True, "orientation": said}
@@ -148,10 +153,10 @@ def stand_upright(scan: bpy.types.Object, found: FoundLandmarks) -> FoundLandmar
 
 
 def _transform(scan, matrix) -> None:
-    """Move the mesh of the ``scan`` and the landmarks on it by a ``matrix`` in its own space."""
-    scan.data.transform(matrix)
-    for item in scan_landmarks.entries(scan).values():
-        item.co, item.found = matrix @ Vector(item.co), matrix @ Vector(item.found)
+    """Move the mesh of the ``scan`` and what is kept on it by a ``matrix`` (4, 4) in its own space, about the origin."""
+    mesh_follow.settle(scan)
+    scan.data.transform(Matrix(matrix.tolist()), shape_keys=True)
+    mesh_follow.carry(scan, matrix)
 
 
 def _clear_view(context, obj) -> None:
@@ -203,10 +208,6 @@ def summary(scan: bpy.types.Object) -> str:
     return f"{scan.name}: {len(scan.data.polygons):,} faces{made}. {report.get('orientation', '')}".strip()
 
 
-def _rotation(scan) -> np.ndarray:
-    return np.array(scan.get(TURN, np.eye(3).ravel())).reshape(3, 3)
-
-
 def load_landmarks(scan: bpy.types.Object, path) -> int:
     """Replace the scan's landmarks by those of a file (mm, in the axes of the scan's file); returns how many.
 
@@ -214,9 +215,10 @@ def load_landmarks(scan: bpy.types.Object, path) -> int:
     ------
     InputError : the file cannot be used (`sim.adapt.landmarks`).
     """
-    turn = _rotation(scan)
     file = read_landmark_file(path)
-    read = {name: turn @ position for name, position in file.positions.items() if name in SKIN}
+    mesh_follow.settle(scan)
+    axes = mesh_follow.file_axes(scan)
+    read = {name: mesh_follow.moved(axes, place) for name, place in file.positions.items() if name in SKIN}
     scan_landmarks.replace(scan, read, file.found)
     return len(read)
 
@@ -226,10 +228,12 @@ def save_landmarks(scan: bpy.types.Object, path) -> int:
 
     They are in the axes of the scan's file; returns how many.
     """
-    turn = _rotation(scan)
+    mesh_follow.settle(scan)
+    back = np.linalg.inv(mesh_follow.file_axes(scan))
     placed = scan_landmarks.to_build(scan)
     missing = [n for n in SKIN if n not in placed]
-    write_landmarks(path, {n: p @ turn for n, p in placed.items()}, missing, scan_landmarks.nobody_placed(scan))
+    in_file = {n: mesh_follow.moved(back, p) for n, p in placed.items()}
+    write_landmarks(path, in_file, missing, scan_landmarks.nobody_placed(scan))
     return len(placed)
 
 
@@ -242,6 +246,7 @@ def build(context, scan: bpy.types.Object, name: str = "") -> Work:
     ------
     InputError : too few landmarks, or they do not fit the scan.
     """
+    mesh_follow.settle(scan)
     placed = scan_landmarks.to_build(scan)
     if len(placed) < scan_landmarks.ENOUGH_TO_BUILD:
         raise InputError(f"{scan.name} has {len(placed)} landmarks: place at least {scan_landmarks.ENOUGH_TO_BUILD}.")
