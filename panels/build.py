@@ -59,7 +59,7 @@ def _result(layout, context, skin):
         hint(layout, context, fit["sentence"], "CHECKMARK")
     if fit.get("advice"):
         hint(layout, context, fit["advice"])
-    _show(layout, skin)
+    _show(layout, context, skin)
     _fit(layout, context, skin)
     if detail_images.images_of(skin) is not None:
         layout.prop(skin.headshop, "detail")
@@ -70,7 +70,7 @@ def _result(layout, context, skin):
         hint(layout, context, "Repacking UVs needs the library xatlas, which this Blender does not have.")
 
 
-def _show(layout, skin):
+def _show(layout, context, skin):
     """What of the head is seen in the viewport."""
     row = layout.row(align=True)
     row.prop(skin, "hide_viewport", text="Skin", toggle=True, invert_checkbox=True)
@@ -78,7 +78,9 @@ def _show(layout, skin):
     if muscles is not None:
         row.prop(muscles, "hide_viewport", text="Muscles", toggle=True, invert_checkbox=True)
     scan = heads.scan_of(skin)
-    if scan is not None:
+    if (
+        scan is not None and scan.name in context.scene.objects
+    ):  # a deleted one stays in the file while the head knows it
         row.prop(scan, "hide_viewport", text="Scan", toggle=True, invert_checkbox=True)
 
 

@@ -153,6 +153,41 @@ def test_how_the_file_was_read_is_shown_and_doubt_is_said(addon, scan):
         assert said in text and "Read as +Y up, facing +Z" in text and ("by the face" in text) == (unit == "face")
 
 
+def test_sheets_that_overlapped_are_told(addon, scan):
+    import json
+
+    from headshop.headshop_addon import heads
+
+    scan[heads.REPORT] = json.dumps({"scan": {"sheets": 4, "sheets_apart_mm": 0.84}})
+    assert "4 overlapping sheets, laid onto each other: 0.8 mm apart" in _text(draw_all(addon), "scan")
+
+
+def test_what_is_left_of_a_scan_that_is_not_chosen_or_deleted(addon, scan, reference):
+    """Its field stays, so that it can be chosen again; a deleted one has no switch."""
+    from headshop.headshop_addon import heads
+
+    scan[heads.PART] = "scan"
+    heads.create_head(reference, "Ref", scan)
+    assert "Scan" in draw_all(addon)["HEADSHOP_PT_build"]
+    addon.context.scene.headshop.scan = None
+    drawn = draw_all(addon)["HEADSHOP_PT_scan"]
+    assert "" in drawn and "Start here" not in " ".join(drawn)
+    for collection in scan.users_collection:
+        collection.objects.unlink(scan)
+    assert "Scan" not in draw_all(addon)["HEADSHOP_PT_build"] and "Start here" in _text(draw_all(addon), "scan")
+
+
+def test_a_landmark_that_counts_can_be_left_out(addon, scan, reference):
+    from headshop.headshop_addon import scan_landmarks
+
+    scan_landmarks.replace(scan, {n: p for n, p in reference.landmark_positions().items() if n != "ch_r"})
+    names = [item.name for item in scan.headshop.landmarks]
+    for name, there in (("prn", True), ("ch_r", False)):
+        scan.headshop.landmark_index = names.index(name)
+        drawn = draw_all(addon)["HEADSHOP_PT_landmark_list"]
+        assert f"Place {name}" in drawn and ("Leave Out" in drawn) == there
+
+
 def test_a_head_shows_every_slider_once_and_every_expression(addon, reference):
     from headshop.headshop_addon import heads
     from headshop.sim.acting.expressions import expressions

@@ -103,6 +103,35 @@ def test_views_that_fit_are_kept_once_too(outside):
     assert abs(scan.vertices[:, None] - outside.vertices[None, :1]).min() < 1e-2
 
 
+def test_what_shows_most_stays_where_it_is(outside):
+    """Landmarks of a file were picked on the scan as it came: a patch goes to the head, not the head to the patch."""
+    face = outside.vertices[outside.triangles].mean(axis=1)[:, 1] < -30
+    patch = Mesh.from_triangles(outside.vertices + [1.2, 0.8, 0.0], outside.triangles[face])
+    scan, counts = clean_scan(joined([outside, patch]))
+    assert counts["sheets"] == 2
+    back = scan.vertices[:, 1] > 30
+    off = Surface(outside.vertices, outside.triangles).closest(scan.vertices[back]).distance
+    assert back.sum() > 500 and off.max() < 0.45
+
+
+def test_a_seam_is_no_step(outside):
+    """Two that differ in shape: where the one ends they are the other, and become it little by little."""
+    rows, quads = smoother(Mesh.from_triangles(outside.vertices, outside.triangles).faces, len(outside.vertices))
+    fine = Mesh.from_triangles(rows @ outside.vertices, Mesh(rows @ outside.vertices, quads).triangles)
+    low = fine.vertices[fine.triangles].mean(axis=1)[:, 2] < 40
+    wavy = fine.vertices + np.sin(fine.vertices[:, [2]] / 25) * np.cos(fine.vertices[:, [0]] / 25) * [0.0, 0.8, 0.0]
+    scan, counts = clean_scan(joined([fine, Mesh.from_triangles(wavy, fine.triangles[~low])]))
+    assert counts["sheets"] == 2
+    edges = scan.vertices[scan.triangles]
+    gone = edges - Surface(fine.vertices, fine.triangles).closest(scan.vertices).points[scan.triangles]
+    bent = np.linalg.norm(gone - np.roll(gone, 1, axis=1), axis=2) / np.linalg.norm(
+        edges - np.roll(edges, 1, axis=1), axis=2
+    )
+    middle = edges.mean(axis=1)
+    forehead = (abs(middle[:, 2] - 40) < 10) & (middle[:, 1] < -20)
+    assert np.linalg.norm(gone, axis=2)[forehead].max() > 0.2 and bent[forehead].max() < 0.22
+
+
 @pytest.mark.parametrize("unit", [1e-3, 1 / 25.4, 40.0])
 def test_views_in_any_unit(views, unit):
     raw = joined(views)

@@ -34,9 +34,8 @@ ALIKE = 0.7
 SAMPLES, ROUNDS = 2000, 10
 #: Share of a view's points that must lie on another one, and of all the surface that must be seen twice.
 OVERLAP, TWICE = 0.08, 0.2
-#: Parts of the reach that views are apart at most, as they come and laid as well as they can be: hair and clothes on skin are
-#: farther.
-BEFORE, AFTER = 1 / 2, 1 / 4
+#: Part of the reach that views are apart at most, by their median: hair and clothes on skin are farther.
+APART = 1 / 2
 #: Weight of what a view shows at its very border, where no other one counts.
 LEAST = 0.02
 #: Rings of triangles by which views still overlap where one takes over from another.
@@ -143,7 +142,7 @@ def _registering(views, reach, area, whole):
     step = [slice(None, None, max(len(view.at) // SAMPLES, 1)) for view in views]
     pairs = list(permutations(range(len(views)), 2))
     met = {(i, j): _met(views, places, i, j, step[i], 2 * reach) for i, j in pairs}
-    met = {pair: met[pair] for pair in pairs if _lie_on_each_other(met, pair, BEFORE * reach)}
+    met = {pair: met[pair] for pair in pairs if _lie_on_each_other(met, pair, APART * reach)}
     seen = np.zeros(len(views))
     for i, j in met:
         seen[i] = max(seen[i], _share(met, (i, j)))
@@ -159,13 +158,13 @@ def _registering(views, reach, area, whole):
         met = {(i, j): _met(views, places, i, j, step[i], within) for i, j in met}
     views_met = sorted({k for pair in met for k in pair})
     met = {(i, j): _met(views, places, i, j, step[i], reach) for i, j in permutations(views_met, 2)}
-    return places, [pair for pair in met if _lie_on_each_other(met, pair, AFTER * reach, 0.0)], apart
+    return places, [pair for pair in met if len(met[pair][2])], apart
 
 
-def _lie_on_each_other(met, pair, apart, share=OVERLAP):
-    """Whether more than a ``share`` of one of the ``pair`` is on the other one, no more than ``apart`` from it."""
+def _lie_on_each_other(met, pair, apart):
+    """Whether enough of one of the ``pair`` is on the other one, no more than ``apart`` from it."""
     gap = np.concatenate([met[pair][2], met[pair[::-1]][2]])
-    enough = max(_share(met, pair), _share(met, pair[::-1])) > share
+    enough = max(_share(met, pair), _share(met, pair[::-1])) > OVERLAP
     return enough and np.median(np.abs(gap)) < apart
 
 
