@@ -6,8 +6,11 @@ import pytest
 
 from headshop.sim.adapt import skin_fit
 from headshop.sim.adapt.closest import Surface
+from headshop.sim.adapt.eyeballs import looking_between_lids, place_eye
 from headshop.sim.adapt.landmarks import read_landmarks
 from headshop.sim.adapt.openings import CORNER, between_lids, lid_margins, rims
+from headshop.sim.adapt.rest import rest_of
+from headshop.sim.adapt.shut_eyes import with_shut_eyes
 from headshop.sim.anatomy.landmark_names import SKIN
 from headshop.sim.mesh_subdivision import drawn
 from headshop.sim.progress import finish
@@ -93,3 +96,44 @@ def test_lids_arch_over_the_flat_eyes_of_a_mannequin(shared, reference):
         assert abs(height.max() - above(marks[f"ps_{side}"][None])[1][0]) < 0.8
         order = np.argsort(share)
         assert np.interp(0.73, share[order], height[order]) > 0.65 * height.max()
+
+
+def looking(reference, skin, pitch=0.0, head=None):
+    """The eyes (left, right) in ``skin`` (n, 3), by bone around them that has turned up by ``pitch`` rad."""
+    rest = rest_of(head or reference)
+    c, s = np.cos(pitch), np.sin(pitch)
+    turn, start = np.array([[1, 0, 0], [0, c, s], [0, -s, c]]), rest.head.skin.vertices
+    margins = [rest.at_iris[side] for side in "lr"]
+    eyes = [
+        place_eye(eye, lambda x: x, turn, start, skin, rest.lids(side), rest.inner, margin, 1.0)
+        for eye, side, margin in zip(reference.eyes, "lr", margins, strict=True)
+    ]
+    return looking_between_lids(reference.eyes, eyes, [turn, turn], start, skin, margins)[0]
+
+
+def pupil_height(eye) -> float:
+    """mm, of the middle of its iris."""
+    return (eye.centre + 0.83 * eye.radius * eye.gaze)[2]
+
+
+def test_eyes_look_between_their_lids(reference):
+    """Bone that followed a forehead and cheeks had both eyes look up, so that the upper lids cut the pupils."""
+    skin = reference.skin.vertices
+    for eye, own in zip(looking(reference, skin), reference.eyes, strict=True):
+        np.testing.assert_allclose(eye.centre, own.centre, atol=1e-6)
+        np.testing.assert_allclose(eye.gaze, own.gaze, atol=1e-9)
+    for eye, own in zip(looking(reference, skin, 0.1), reference.eyes, strict=True):
+        assert eye.gaze[2] < 0.05 and abs(pupil_height(eye) - pupil_height(own)) < 0.4
+    low = skin - np.outer(
+        2 * np.maximum(*(reference.groups[f"lid_{lid}_l"] for lid in ("upper", "lower"))), [0, 0, 1.0]
+    )
+    eyes = looking(reference, low)
+    assert eyes[0].gaze[2] == pytest.approx(eyes[1].gaze[2], abs=1e-9)  # both alike
+    assert eyes[0].gaze[2] < -0.005
+    assert pupil_height(eyes[0]) < pupil_height(reference.eyes[0]) - 0.8
+
+
+def test_shut_lids_do_not_turn_eyes(reference):
+    shut = with_shut_eyes(reference, BOTH)
+    for eye, own in zip(looking(reference, shut.skin.vertices, 0.0, shut), reference.eyes, strict=True):
+        np.testing.assert_allclose(eye.gaze, own.gaze, atol=1e-9)

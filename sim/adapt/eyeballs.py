@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Eyeballs stay spheres: their place and size follow from the lids that lie on them."""
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
 
 from ..anatomy.eyeball import BALL
 from ..anatomy.head import Eye, Head
@@ -31,6 +33,10 @@ AROUND_CARUNCLE = 4.0  # mm: lids and eyeball this near carry it
 #: Weight of the lower lid's margin against all of the shut lids: it touches the iris or covers a little of it, but does not
 #: hang below, and where it lies is sure to half a millimetre; how thick lids are, to one.
 HANGING = 0.3
+#: Open lids lie about the iris as the reference's do: weight of the middle between their margins against all of the lids, share
+#: of what is left that the eyes look up or down by, and at most, rad. The bone around an eye has not turned as the eye has: it
+#: looks 4 degrees too high on heads whose gaze is known.
+BETWEEN, LOOKS, MOST_LOOK = 0.12, 0.8, 0.25
 OUTSIDE = 0.8  # mm of lid between eyeball and seen skin, at least, where the reference has as much
 
 
@@ -48,7 +54,7 @@ def gaze_turn(eyes, warped) -> np.ndarray:
     return left @ right
 
 
-def place_eye(eye: Eye, warped, turn, reference_skin, fitted_skin, lid, inner, margin, scale: float) -> Eye:
+def place_eye(eye: Eye, warped, turn, reference_skin, fitted_skin, lid, inner, margins, scale: float) -> Eye:
     """The eye for a fitted skin.
 
     Parameters
@@ -58,7 +64,7 @@ def place_eye(eye: Eye, warped, turn, reference_skin, fitted_skin, lid, inner, m
     turn : (3, 3), see `gaze_turn`
     reference_skin, fitted_skin (n, 3) mm
     lid (n,) weights of both lids of this eye; inner (n,) bool: behind the lids
-    margin (m,) vertices of a shut lower lid's margin below the iris
+    margins : see `Rest.at_iris`
     scale : size of the fitted head relative to the reference
     """
     radius = float(np.clip(eye.radius * scale ** (0.6 if scale < 1 else 0.4), SMALLEST, LARGEST))
@@ -71,10 +77,9 @@ def place_eye(eye: Eye, warped, turn, reference_skin, fitted_skin, lid, inner, m
     if len(near) < 6:
         return _moved(eye, centre, radius, gaze)
     want = gap[near] * radius / eye.radius
-    up = np.array([0, 0, 1.0]) - eye.gaze[2] * eye.gaze
-    up /= np.linalg.norm(up)
-    low = (reference_skin[margin] - eye.centre).mean(axis=0) @ up * radius / eye.radius if len(margin) else 0.0
-    rim, up = fitted_skin[margin].mean(axis=0) if len(margin) else centre, turn @ up
+    up = _up(eye)
+    low = (_middle(reference_skin, margins) - eye.centre) @ up * radius / eye.radius if margins else 0.0
+    rim, up = _middle(fitted_skin, margins) if margins else centre, turn @ up
     points, prior = fitted_skin[near], centre.copy()
     for _ in range(30):
         away = points - centre
@@ -84,7 +89,7 @@ def place_eye(eye: Eye, warped, turn, reference_skin, fitted_skin, lid, inner, m
         weight = np.where(miss < 0, 4.0, 1.0) / (1 + (miss / 1.5) ** 2)
         unit = away / length[:, None]
         hangs = (rim - centre) @ up - low
-        hold = HANGING * len(near) * (hangs < 0) * (len(margin) > 0)
+        hold = len(near) * (0.0, HANGING * (hangs < 0), BETWEEN)[len(margins)]
         system = (weight[:, None] * unit).T @ unit + 0.05 * len(near) * np.eye(3) + hold * np.outer(up, up)
         right = (weight * miss) @ unit + 0.05 * len(near) * (prior - centre) + hold * hangs * up
         step = np.linalg.solve(system, right)
@@ -92,6 +97,35 @@ def place_eye(eye: Eye, warped, turn, reference_skin, fitted_skin, lid, inner, m
         if np.linalg.norm(step) < 1e-4:
             break
     return _moved(eye, centre, radius, gaze)
+
+
+def looking_between_lids(old, new, turns, reference_skin, fitted_skin, margins):
+    """(eyes, turns) that look up or down, all alike, toward where the reference's look between their open lids.
+
+    old, new : eyes of the reference and of the fitted head; turns, margins : of each, see `gaze_turn` and `Rest.at_iris`
+    """
+    rise = []
+    for eye, placed, turn, lids in zip(old, new, turns, margins, strict=True):
+        if len(lids) == 2:
+            there = (_middle(fitted_skin, lids) - placed.centre) @ turn, _middle(reference_skin, lids) - eye.centre
+            fitted, own = (np.arctan2(arm @ _up(eye), arm @ eye.gaze) for arm in there)
+            rise.append(fitted - own)
+    look = float(np.clip(LOOKS * np.mean(rise), -MOST_LOOK, MOST_LOOK)) if rise else 0.0
+    turned = [
+        t @ Rotation.from_rotvec(look * np.cross(e.gaze, _up(e))).as_matrix() for e, t in zip(old, turns, strict=True)
+    ]
+    return [replace(e, gaze=t @ o.gaze) for o, e, t in zip(old, new, turned, strict=True)], turned
+
+
+def _middle(skin, margins):
+    """(3,) mm midway between the ``margins`` of lids, see `Rest.at_iris`."""
+    return np.mean([skin[rows].mean(axis=0) for rows in margins], axis=0)
+
+
+def _up(eye: Eye):
+    """(3,) unit vector upward across the gaze."""
+    up = np.array([0, 0, 1.0]) - eye.gaze[2] * eye.gaze
+    return up / np.linalg.norm(up)
 
 
 def _moved(eye, centre, radius, gaze):

@@ -64,14 +64,17 @@ def follow(
     parts = {name: with_teeth(rest, name, moved, mouth) for name, moved in parts.items()}
 
     yield Progress(0.25, "Eyes and teeth")
-    eyes, carried, skull = [], {"mouth": mouth}, parts["skull"]
+    eyes, turns, carried, skull = [], [], {"mouth": mouth}, parts["skull"]
     both = [near_bone(rest, parts, eye.centre[None], AROUND_EYE) for eye in reference.eyes]
-    for old, around, side in zip(reference.eyes, both, "lr", strict=True):
+    margins = [rest.at_iris[side] for side in "lr"]
+    for old, around, side, margin in zip(reference.eyes, both, "lr", margins, strict=True):
         # lids that are shut tell nothing of where an eye looks
         turn = eyeballs.gaze_turn(reference.eyes, both) if side in rest.slits else eyeballs.gaze_turn((old,), (around,))
-        lids = rest.lids(side), rest.inner, rest.under_iris[side]
-        new = eyeballs.place_eye(old, around, turn, start, skin, *lids, scale)
-        eyes.append(new)
+        lids = rest.lids(side), rest.inner, margin
+        turns.append(turn)
+        eyes.append(eyeballs.place_eye(old, around, turn, start, skin, *lids, scale))
+    eyes, turns = eyeballs.looking_between_lids(reference.eyes, eyes, turns, start, skin, margins)
+    for old, new, around, turn, side in zip(reference.eyes, eyes, both, turns, "lr", strict=True):
         skull = eyeballs.with_orbit(skull, new, new.centre - around(old.centre[None])[0])
         carried[f"eye_{side}"] = eyeballs.eye_similarity(old, new, turn)
     parts["skull"] = skull

@@ -127,15 +127,17 @@ class Rest:
         return {side: LidSlit(self, side) for side in "lr" if len(touching_lids(self.head, self.rim, side)) >= SHUT}
 
     @cached_property
-    def under_iris(self) -> dict[str, np.ndarray]:
-        """Side -> (k,) vertices of the lower lid's margin below the iris of that eye; none if it is open: then its lids'
-        own places tell enough."""
+    def at_iris(self) -> dict[str, tuple[np.ndarray, ...]]:
+        """Side -> per lid (k,) vertices of its margin above or below the iris of that eye: of both lids, upper first, or of the
+        lower one if the eye is shut."""
         out = {}
         for eye, side in zip(self.head.eyes, "lr", strict=True):
-            margin = np.flatnonzero(self.rim & (group(self.head, f"lid_lower_{side}") > 0.5))
             across = np.cross(eye.gaze, [0, 0, 1.0])
-            off = np.abs((self.head.skin.vertices[margin] - eye.centre) @ across) / np.linalg.norm(across)
-            out[side] = margin[off < eye.iris_radius] if side in self.slits else margin[:0]
+            off = np.abs((self.head.skin.vertices - eye.centre) @ across) / np.linalg.norm(across)
+            near = self.rim & (off < eye.iris_radius)
+            lids = ("lower",) if side in self.slits else ("upper", "lower")
+            rows = tuple(np.flatnonzero(near & (group(self.head, f"lid_{lid}_{side}") > 0.5)) for lid in lids)
+            out[side] = rows if all(map(len, rows)) else ()
         return out
 
     def _lip_pairs(self):
