@@ -150,6 +150,35 @@ def test_colours_stay_with_what_they_are_of(views):
     assert (scan.colour[left, 0] == 0.5).mean() > 0.75 and (scan.colour[right, 0] == 0.75).mean() > 0.75
 
 
+def test_pictures_stay_with_what_they_are_of(views):
+    """Of each view a picture of one grey; on every triangle is that of its view."""
+    shown = [
+        replace(
+            v,
+            uv=np.full((len(v.faces), 4, 2), 0.5, np.float32),
+            material=np.zeros(len(v.faces), np.int16),
+            pictures=(np.full((2, 2, 3), 60 * (k + 1), np.uint8),),
+        )
+        for k, v in enumerate(views)
+    ]
+    scan, _ = clean_scan(joined(shown))
+    assert len(scan.uv) == len(scan.material) == len(scan.faces)
+    grey = np.array([picture[0, 0, 0] for picture in scan.pictures])[scan.material] / 255
+    np.testing.assert_allclose(scan.colour[scan.triangles][:, :, 0], np.repeat(grey[:, None], 3, axis=1), atol=0.01)
+
+
+def test_a_lump_in_one_view_does_not_push_it_aside(outside):
+    """Hair that blew about between two shots: what else the views show tells how they lie."""
+    face = outside.vertices[outside.triangles].mean(axis=1)[:, 1] < -20
+    lump = np.exp(-(np.linalg.norm(outside.vertices - [0, -80, 60], axis=1)[:, None] ** 2) / (2 * 22.0**2))
+    other = Mesh.from_triangles(outside.vertices + [0.6, 0.6, 0.0] + lump * [0.0, -3.5, 0.0], outside.triangles[face])
+    scan, counts = clean_scan(joined([outside, other]))
+    assert counts["sheets"] == 2
+    chin = (scan.vertices[:, 2] < -55) & (scan.vertices[:, 1] < -50)
+    off = Surface(outside.vertices, outside.triangles).closest(scan.vertices[chin]).distance
+    assert chin.sum() > 200 and np.percentile(off, 95) < 0.3
+
+
 def test_views_beside_each_other_stay(views, outside):
     """Less than `TWICE` of all is seen twice: seams, as fused scans have them."""
     x = outside.vertices[outside.triangles].mean(axis=1)[:, 0]

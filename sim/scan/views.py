@@ -38,21 +38,21 @@ OVERLAP, TWICE = 0.08, 0.2
 APART = 1 / 2
 #: Weight of what a view shows at its very border, where no other one counts.
 LEAST = 0.02
+#: By how much each view counts for less than the one before where something shows equally well in both.
+FIRST = 1e-4
 #: Rings of triangles by which views still overlap where one takes over from another.
 STRIP = 2
 
 
 class _View(NamedTuple):
     """One piece of a scan: ``at`` (k,) its vertices; ``points`` and ``normals`` (k, 3) of them; what answers where it is
-    nearest; ``rim`` the tree of its border, or None; ``toward`` (3,) where most of it faces; ``inside`` (k,) 0 at its border,
-    1 away from it."""
+    nearest; ``rim`` the tree of its border, or None; ``inside`` (k,) 0 at its border, 1 away from it."""
 
     at: np.ndarray
     points: np.ndarray
     normals: np.ndarray
     surface: Surface
     rim: cKDTree | None
-    toward: np.ndarray
     inside: np.ndarray
 
 
@@ -123,9 +123,7 @@ def _view(points, triangles, normals, own, width) -> _View:
     surface = Surface(surface.vertices, surface.triangles, 2 * surface.edge_length)
     ends = surface.vertices[surface.border_vertex]
     rim = cKDTree(ends) if len(ends) else None
-    toward = normals[at].mean(axis=0)
-    toward /= max(np.linalg.norm(toward), 1e-12)
-    return _View(at, points[at], normals[at], surface, rim, toward, _inside(rim, points[at], width))
+    return _View(at, points[at], normals[at], surface, rim, _inside(rim, points[at], width))
 
 
 def _inside(rim, points, width):
@@ -153,7 +151,7 @@ def _registering(views, reach, area, whole):
     radius = np.mean([np.linalg.norm(view.points - middle, axis=1).mean() for view in views])
     for turn in range(ROUNDS):
         yield Progress(0.1 + 0.6 * turn / ROUNDS, LABEL)
-        places = _stepped(places, met, middle, radius, reach, area)
+        places = _stepped(places, met, middle, radius, area)
         within = reach * np.interp(turn, [0, ROUNDS / 2], [2, 1])
         met = {(i, j): _met(views, places, i, j, step[i], within) for i, j in met}
     views_met = sorted({k for pair in met for k in pair})
@@ -195,15 +193,14 @@ def _about_closest(surface: Surface, points, within):
     return surface.contacts(len(points), near, distance, owner, weights)
 
 
-def _stepped(places, met, middle, radius, reach, area):
-    """``places`` after one step of all views toward each other, by least squares of the distances to planes, large ones
-    counting for less; what nothing tells stays, and all of them together, by their ``area``, do."""
+def _stepped(places, met, middle, radius, area):
+    """``places`` after one step of all views toward each other, by least squares of the distances to planes; what nothing tells
+    stays, and all of them together, by their ``area``, do."""
     count = 6 * len(places)
     normal, right = np.zeros((count, count)), np.zeros(count)
     for (i, j), (points, facing, gap, _) in met.items():
         lever = np.hstack([np.cross((points - middle) / radius, facing), facing])
-        weight = 1 / (1 + (gap / (reach / 3)) ** 2) ** 2
-        square, pull = lever.T @ (lever * weight[:, None]), lever.T @ (weight * gap)
+        square, pull = lever.T @ lever, lever.T @ gap
         one, two = slice(6 * i, 6 * i + 6), slice(6 * j, 6 * j + 6)
         normal[one, one] += square
         normal[two, two] += square
@@ -225,7 +222,7 @@ def _consensus(views, places, k, others, reach):
     view, (turn, shift) = views[k], places[k]
     points, normals = view.points @ turn.T + shift, view.normals @ turn.T
     total, weight = np.zeros(len(points)), view.inside + LEAST
-    own = view.inside * _worth(view.normals, views, k)
+    own = view.inside * (1 - FIRST * k)
     spare = np.zeros(len(points), dtype=bool)
     for j in others:
         other, away = places[j]
@@ -238,10 +235,5 @@ def _consensus(views, places, k, others, reach):
         share = inside * np.clip(2 - 2 * hit.distance[ok] / reach, 0, 1)
         total[ok] += share * np.einsum("ij,ij->i", (hit.points[ok] - local[ok]) @ other.T, normals[ok])
         weight[ok] += share
-        spare[ok] |= share * _worth(hit.normals[ok], views, j) > own[ok]
+        spare[ok] |= share * (1 - FIRST * j) > own[ok]
     return points + (total / weight)[:, None] * normals, spare
-
-
-def _worth(normals, views, k):
-    """(n,) how well view k shows what faces along ``normals`` (n, 3); of views that show it as well, the first."""
-    return np.maximum(normals @ views[k].toward, 0.05) * (1 - 0.01 * k / len(views))
