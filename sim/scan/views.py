@@ -38,8 +38,9 @@ OVERLAP, TWICE = 0.08, 0.2
 APART = 1 / 2
 #: Weight of what a view shows at its very border, where no other one counts.
 LEAST = 0.02
-#: By how much each view counts for less than the one before where something shows equally well in both.
-FIRST = 1e-4
+#: How much more another view must count, of the most it may, for what shows in this one to be spare: so much may be told
+#: otherwise from either's vertices, and what each leaves to the other would be lost.
+BETTER = 0.25
 #: Rings of triangles by which views still overlap where one takes over from another.
 STRIP = 2
 
@@ -218,11 +219,10 @@ def _stepped(places, met, middle, radius, area):
 
 def _consensus(views, places, k, others, reach):
     """Where the points of view k go, (n, 3): along their normals to where those of all views that saw the place are on
-    average; and which of them another one shows better (n,) bool."""
+    average; and which of them another one shows better, or as well and comes first (n,) bool."""
     view, (turn, shift) = views[k], places[k]
     points, normals = view.points @ turn.T + shift, view.normals @ turn.T
     total, weight = np.zeros(len(points)), view.inside + LEAST
-    own = view.inside * (1 - FIRST * k)
     spare = np.zeros(len(points), dtype=bool)
     for j in others:
         other, away = places[j]
@@ -235,5 +235,6 @@ def _consensus(views, places, k, others, reach):
         share = inside * np.clip(2 - 2 * hit.distance[ok] / reach, 0, 1)
         total[ok] += share * np.einsum("ij,ij->i", (hit.points[ok] - local[ok]) @ other.T, normals[ok])
         weight[ok] += share
-        spare[ok] |= share * (1 - FIRST * j) > own[ok]
+        as_well = (j < k) & (share == 1.0) & (view.inside[ok] == 1.0)
+        spare[ok] |= as_well | (share > view.inside[ok] + BETTER)
     return points + (total / weight)[:, None] * normals, spare
