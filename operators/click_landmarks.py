@@ -106,10 +106,13 @@ class HEADSHOP_OT_click_landmarks(bpy.types.Operator):
         self._hidden = scan.hide_viewport
         scan.hide_viewport = False
         scan.hide_set(False)
-        collections = map(heads.head_collection, heads.built_from(context.scene, scan))
-        self._covered = [c.name for c in collections if c is not None and not c.hide_viewport]
+        collections = filter(None, map(heads.head_collection, heads.built_from(context.scene, scan)))
+        parts = {obj for collection in collections for obj in collection.all_objects} - {
+            scan
+        }  # it may be in there as well
+        self._covered = [obj.name for obj in parts if not obj.hide_viewport]
         for name in self._covered:
-            bpy.data.collections[name].hide_viewport = True
+            bpy.data.objects[name].hide_viewport = True
 
     def _can_go_on(self, context) -> bool:
         """Whether the scan is still there, as an object."""
@@ -153,8 +156,8 @@ class HEADSHOP_OT_click_landmarks(bpy.types.Operator):
 
     def _finish(self, context):
         for name in self._covered:
-            if name in bpy.data.collections:
-                bpy.data.collections[name].hide_viewport = False
+            if name in bpy.data.objects:
+                bpy.data.objects[name].hide_viewport = False
         if self._covered and self._can_go_on(context):
             self._scan.hide_viewport = self._hidden
         landmark_overlay.asked_for = ""

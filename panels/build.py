@@ -78,9 +78,8 @@ def _show(layout, context, skin):
     if muscles is not None:
         row.prop(muscles, "hide_viewport", text="Muscles", toggle=True, invert_checkbox=True)
     scan = heads.scan_of(skin)
-    if (
-        scan is not None and scan.name in context.scene.objects
-    ):  # a deleted one stays in the file while the head knows it
+    # A deleted one stays in the file while the head knows it.
+    if scan is not None and scan.name in context.scene.objects:
         row.prop(scan, "hide_viewport", text="Scan", toggle=True, invert_checkbox=True)
 
 

@@ -40,13 +40,20 @@ def test_the_head_gives_way_to_its_scan_and_comes_back(clicks, context, referenc
 
     collection = heads.create_head(reference, "Ref", clicks._scan)
     other = heads.create_head(reference, "Other")
+    for there in clicks._scan.users_collection:  # as heads that were built without a window have it
+        if there != collection:
+            there.objects.unlink(clicks._scan)
+    hidden = [obj.name for obj in collection.all_objects if obj.hide_viewport]
+    before = {obj.hide_viewport for obj in other.all_objects}
     clicks._scan.hide_viewport = True
     clicks._scan.hide_set(True)
     clicks._show_alone(context)
     assert not clicks._scan.hide_viewport and not clicks._scan.hide_get()
-    assert collection.hide_viewport and not other.hide_viewport
+    own, others = ({obj.hide_viewport for obj in c.all_objects if obj != clicks._scan} for c in (collection, other))
+    assert clicks._scan.visible_get() and own == {True} and others == before
     clicks._finish(context)
-    assert clicks._scan.hide_viewport and not collection.hide_viewport and not other.hide_viewport
+    assert clicks._scan.hide_viewport
+    assert [obj.name for obj in collection.all_objects if obj.hide_viewport] == hidden + [clicks._scan.name]
 
 
 def test_a_scan_without_a_head_stays_shown(clicks, context):

@@ -205,6 +205,15 @@ def test_hair_and_clothes_are_no_views(outside, where, least):
     assert counts["sheets"] == 0 and counts["triangles"] == len(outside.triangles) + len(shell.triangles)
 
 
+def test_clothes_on_somebody_from_head_to_foot_are_no_views(outside):
+    """A body, which a head and what is drawn out of it stand for here, and a shirt 3 mm above it."""
+    drawn_out = outside.vertices * [1.0, 1.0, 6.0]
+    shirt = outside.triangles[(outside.vertices[:, 2] < 0)[outside.triangles].all(axis=1)]
+    clothes = Mesh.from_triangles(drawn_out + 3 * vertex_normals(drawn_out, outside.triangles), shirt)
+    scan, counts = clean_scan(joined([outside.moved(drawn_out), clothes]))
+    assert counts["sheets"] == 0 and counts["triangles"] == len(outside.triangles) + len(shirt)
+
+
 def test_a_skull_in_its_skin_is_no_view(reference):
     scan, counts = clean_scan(joined([reference.skin, reference.parts["skull"]]))
     assert counts["sheets"] == 0 and counts["components"] == 2

@@ -24,6 +24,9 @@ from ..progress import Progress, Work
 LABEL = "Laying the views onto each other"
 #: Part of the surface that a piece must have to be a view, and the most views that are looked at.
 LARGE, MOST = 0.04, 40
+#: How many times as long as wide, and as deep, a scan of somebody from head to foot is, by deviations: by such a measure
+#: clothes lie on skin as near as views.
+LONG, DEEP = 2.2, 5.0
 #: How far apart views may lie, as part of the largest one's diagonal: 3 to 4 mm on a head with its shoulders.
 REACH = 0.01
 #: Times the reach over which a view counts for less toward its border.
@@ -67,7 +70,7 @@ def laying_together(points: np.ndarray, triangles: np.ndarray, label: np.ndarray
     area = np.bincount(label, vertex_areas(points, triangles))
     large = np.argsort(-area)[:MOST]
     large = large[area[large] > LARGE * area.sum()]
-    if len(large) < 2:
+    if len(large) < 2 or _is_long(points):
         return as_it_is
     yield Progress(0.0, LABEL)
     reach = REACH * max(np.linalg.norm(np.ptp(points[label == piece], axis=0)) for piece in large)
@@ -89,6 +92,13 @@ def laying_together(points: np.ndarray, triangles: np.ndarray, label: np.ndarray
     for _ in range(STRIP):
         spare[triangles[~spare[triangles].all(axis=1)]] = False
     return out, ~spare[triangles].any(axis=1), len(overlapping), apart
+
+
+def _is_long(points):
+    """Whether the scan lies along a line, or in a plane, as somebody who stands does."""
+    some = points[:: max(len(points) // SAMPLES, 1)]
+    long, wide, deep = np.linalg.svd(some - some.mean(axis=0), compute_uv=False)
+    return long > LONG * wide or long > DEEP * deep
 
 
 def _beside(points, label, large, reach):
