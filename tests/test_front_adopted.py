@@ -174,13 +174,15 @@ def test_what_is_scaled_to_nothing_is_refused(addon, original):
 
 
 @pytest.mark.parametrize(
-    "unit, scale", [("mm", 1.0), ("mm", 0.001), ("mm", 0.01), ("cm", 1.0), ("m", 3.0), ("dm", 0.1)]
+    "unit, scale", [("mm", 1.0), ("mm", 0.001), ("mm", 0.01), ("cm", 1.0), ("m", 3.0), ("dm", 0.1), ("none", 0.05)]
 )
 def test_the_unit_is_told_by_what_is_shown_or_else_by_the_numbers(addon, original, reference, unit, scale):
     """Importers put the numbers of a file as metres, and artists scale what comes in or not: a head is as large as it was."""
     from headshop.headshop_addon import heads
 
-    factor = {"mm": 1000.0, "cm": 100.0, "dm": 10.0, "m": 1.0}[unit]
+    factor = {"mm": 1000.0, "cm": 100.0, "dm": 10.0, "m": 1.0, "none": 20.0}[
+        unit
+    ]  # a head of 7 inches, if they were inches
     original.data.vertices.foreach_set("co", (reference.skin.vertices * 1e-3 * factor).astype(np.float32).ravel())
     original.scale, original.rotation_euler, original.location = (scale,) * 3, (0.0, 0.0, np.pi / 2), (1, 2, 3)
     shown = _world(original)
@@ -202,6 +204,9 @@ def test_another_scan_is_chosen_with_its_landmarks(addon, scan_object, skin_obje
     addon.context.scene.headshop.scan = None
     assert active.scan(addon.context) is None and active.scans(addon.context) == [scan_object]
     addon.context.view_layer.objects.active = scan_object
+    scan_object.select_set(True)
+    scan_object.select_set(False)
+    assert not addon.ops.headshop.choose_scan.poll()
     scan_object.select_set(True)
     assert addon.ops.headshop.choose_scan.poll() and addon.ops.headshop.choose_scan() == {"FINISHED"}
     assert active.scan(addon.context) == scan_object and not scan_object.hide_get()
