@@ -180,9 +180,8 @@ def test_the_unit_is_told_by_what_is_shown_or_else_by_the_numbers(addon, origina
     """Importers put the numbers of a file as metres, and artists scale what comes in or not: a head is as large as it was."""
     from headshop.headshop_addon import heads
 
-    factor = {"mm": 1000.0, "cm": 100.0, "dm": 10.0, "m": 1.0, "none": 20.0}[
-        unit
-    ]  # a head of 7 inches, if they were inches
+    # The last: a head of 7 inches, if its numbers were inches.
+    factor = {"mm": 1000.0, "cm": 100.0, "dm": 10.0, "m": 1.0, "none": 20.0}[unit]
     original.data.vertices.foreach_set("co", (reference.skin.vertices * 1e-3 * factor).astype(np.float32).ravel())
     original.scale, original.rotation_euler, original.location = (scale,) * 3, (0.0, 0.0, np.pi / 2), (1, 2, 3)
     shown = _world(original)
