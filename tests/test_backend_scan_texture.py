@@ -233,6 +233,8 @@ def test_an_adopted_object_keeps_its_picture(addon, sheet):
     from headshop.headshop_addon import bridge, scan_objects, scan_texture
     from headshop.sim.progress import finish
 
+    sheet.scale = (2.0, 2.0, 2.0)  # as large as a face may be
+    addon.context.view_layer.update()
     obj = finish(scan_objects.adopt(addon.context, [sheet]))
     mesh = scan_texture.with_pictures(bridge.object_to_mesh(obj), obj)
     assert has_pictures(mesh) and mesh.colour is not None
