@@ -84,9 +84,12 @@ def anatomy_tiles(skin: bpy.types.Object) -> list[Tile]:
     tiles = []
     if scan is not None:
         points, sheets = (report.get("scan", {}).get(what) for what in ("points", "sheets"))
-        came = f"{len(scan.data.polygons):,} triangles, as it came"
-        came = f"{sheets} sheets, laid onto each other" if sheets else came
-        came = f"made of {points:,} points" if points else came
+        if points:
+            came = f"made of {points:,} points"
+        elif sheets:
+            came = f"{sheets} sheets, laid onto each other"
+        else:
+            came = f"{len(scan.data.polygons):,} triangles, as it came"
         tiles.append(Tile("Scan", came, ("scan",)))
     near = f"{fit['mean_mm']:.2f} mm from the scan on average" if "mean_mm" in fit else "ready to act"
     tiles.append(Tile("Head", near, ("skin", "features")))

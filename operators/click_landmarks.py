@@ -107,10 +107,9 @@ class HEADSHOP_OT_click_landmarks(bpy.types.Operator):
         scan.hide_viewport = False
         scan.hide_set(False)
         collections = filter(None, map(heads.head_collection, heads.built_from(context.scene, scan)))
-        parts = {obj for collection in collections for obj in collection.all_objects} - {
-            scan
-        }  # it may be in there as well
-        self._covered = [obj.name for obj in parts if not obj.hide_viewport]
+        parts = [obj for collection in collections for obj in collection.all_objects]
+        # The scan itself may be among them.
+        self._covered = [obj.name for obj in parts if obj != scan and not obj.hide_viewport]
         for name in self._covered:
             bpy.data.objects[name].hide_viewport = True
 

@@ -32,7 +32,7 @@ class HEADSHOP_PT_scan(SidebarPanel, bpy.types.Panel):
         scan = active.scan(context)
         if scan is not None or active.scans(context):
             layout.prop(settings, "scan", text="")
-        elif scan is None:
+        else:
             hint(layout, context, "Start here: import the scan of a head, or add the sample to try things out.")
         if scan is None:
             return

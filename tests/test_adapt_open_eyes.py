@@ -98,12 +98,13 @@ def test_lids_arch_over_the_flat_eyes_of_a_mannequin(shared, reference):
         assert np.interp(0.73, share[order], height[order]) > 0.65 * height.max()
 
 
-def looking(reference, skin, pitch=0.0, head=None):
-    """The eyes (left, right) in ``skin`` (n, 3), by bone around them that has turned up by ``pitch`` rad."""
+def looking(reference, skin, pitch=0.0, head=None, margins=True):
+    """The eyes (left, right) in ``skin`` (n, 3), by bone around them that has turned up by ``pitch`` rad; without ``margins``
+    as if nothing were known of those of their lids."""
     rest = rest_of(head or reference)
     c, s = np.cos(pitch), np.sin(pitch)
     turn, start = np.array([[1, 0, 0], [0, c, s], [0, -s, c]]), rest.head.skin.vertices
-    margins = [rest.at_iris[side] for side in "lr"]
+    margins = [rest.at_iris[side] if margins else () for side in "lr"]
     eyes = [
         place_eye(eye, lambda x: x, turn, start, skin, rest.lids(side), rest.inner, margin, 1.0)
         for eye, side, margin in zip(reference.eyes, "lr", margins, strict=True)
@@ -130,6 +131,7 @@ def test_eyes_look_between_their_lids(reference):
     eyes = looking(reference, low)
     assert eyes[0].gaze[2] == pytest.approx(eyes[1].gaze[2], abs=1e-9)  # both alike
     assert eyes[0].gaze[2] < -0.005
+    assert eyes[0].centre[2] < looking(reference, low, margins=False)[0].centre[2] - 0.05  # it goes after its lids
     assert pupil_height(eyes[0]) < pupil_height(reference.eyes[0]) - 0.8
 
 

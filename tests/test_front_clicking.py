@@ -10,9 +10,10 @@ import pytest
 @pytest.fixture
 def clicks(addon, scan_object):
     """The operator's methods on an object of Python's own, begun on the scan; ``said`` is what it reported."""
-    from headshop.operators.click_landmarks import HEADSHOP_OT_click_landmarks as Operator  # noqa: N813
+    from headshop.operators import click_landmarks
 
-    methods = {name: item for name, item in vars(Operator).items() if callable(item)}
+    methods = vars(click_landmarks.HEADSHOP_OT_click_landmarks)
+    methods = {name: item for name, item in methods.items() if callable(item)}
     out = type("Clicks", (), methods)()
     out.said = []
     out.report = lambda kind, text: out.said.append(text)

@@ -35,7 +35,7 @@ AROUND_CARUNCLE = 4.0  # mm: lids and eyeball this near carry it
 HANGING = 0.3
 #: Open lids lie about the iris as the reference's do: weight of the middle between their margins against all of the lids, share
 #: of what is left that the eyes look up or down by, and at most, rad. The bone around an eye has not turned as the eye has: it
-#: looks 4 degrees too high on heads whose gaze is known.
+#: looks 4 degrees too high on two scans whose gaze is known.
 BETWEEN, LOOKS, MOST_LOOK = 0.12, 0.8, 0.25
 OUTSIDE = 0.8  # mm of lid between eyeball and seen skin, at least, where the reference has as much
 

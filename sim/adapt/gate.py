@@ -31,8 +31,8 @@ GAIN = 12.0  # squared standard deviations that an exchange of names must save t
 SCALE = (0.45, 1.6)  # head size relative to the reference
 #: Landmarks whose places in a face are plain to see.
 TELLING = "g n se prn sn sl pg gn ls li sto en ex ps pi al ac sbal ch cph".split()
-#: mm: a picked landmark farther from where a face laid on the scan has it is doubted, by its name. Of 15 people their own lie
-#: up to 8.4 off, of one whose chin was moved 12 mm aside 10.8; parted lips have two middles.
+#: mm: a picked landmark farther from where a face laid on the scan has it is doubted, by its name. Of 15 scans their own lie
+#: up to 8.4 off, but for a chin that was moved 12 mm aside, 10.8; parted lips have two middles.
 DOUBTED = dict.fromkeys("prn sn ls li en ex ps pi al ac sbal ch cph".split(), 10.0) | dict.fromkeys(
     "g n se sl pg gn t".split(), 14.0
 )

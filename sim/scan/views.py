@@ -27,7 +27,7 @@ LARGE, MOST = 0.04, 40
 #: How many times as long as wide, and as deep, a scan of somebody from head to foot is, by deviations: by such a measure
 #: clothes lie on skin as near as views.
 LONG, DEEP = 2.2, 5.0
-#: How far apart views may lie, as part of the largest one's diagonal: 3 to 4 mm on a head with its shoulders.
+#: How far apart views may lie, as part of the largest one's diagonal: 4 to 5 mm on a head with its shoulders.
 REACH = 0.01
 #: Times the reach over which a view counts for less toward its border.
 BORDER = 2.0
