@@ -7,6 +7,7 @@ import pytest
 from headshop.sim.adapt import skin_fit
 from headshop.sim.adapt.closest import Surface
 from headshop.sim.adapt.eyeballs import looking_between_lids, place_eye
+from headshop.sim.adapt.follow import follow
 from headshop.sim.adapt.landmarks import read_landmarks
 from headshop.sim.adapt.openings import CORNER, between_lids, lid_margins, rims
 from headshop.sim.adapt.rest import rest_of
@@ -109,7 +110,7 @@ def looking(reference, skin, pitch=0.0, head=None, margins=True):
         place_eye(eye, lambda x: x, turn, start, skin, rest.lids(side), rest.inner, margin, 1.0)
         for eye, side, margin in zip(reference.eyes, "lr", margins, strict=True)
     ]
-    return looking_between_lids(reference.eyes, eyes, [turn, turn], start, skin, margins)[0]
+    return looking_between_lids(reference.eyes, eyes, turn, start, skin, margins)[0]
 
 
 def pupil_height(eye) -> float:
@@ -139,3 +140,14 @@ def test_shut_lids_do_not_turn_eyes(reference):
     shut = with_shut_eyes(reference, BOTH)
     for eye, own in zip(looking(reference, shut.skin.vertices, 0.0, shut), reference.eyes, strict=True):
         np.testing.assert_allclose(eye.gaze, own.gaze, atol=1e-9)
+
+
+def test_eyes_do_not_squint_in_a_face_with_flat_cheeks(reference):
+    """The bone around each eye turned with its cheek, and took its eye along."""
+    start = reference.skin.vertices
+    flat = start - np.outer(0.15 * np.abs(start[:, 0]), [0, 1.0, 0])
+    gaze, own = (
+        np.array([eye.gaze for eye in eyes]) for eyes in (finish(follow(reference, flat)).head.eyes, reference.eyes)
+    )
+    assert gaze[0] @ gaze[1] == pytest.approx(own[0] @ own[1], abs=1e-9)
+    assert np.abs(gaze[:, 0]).max() < 0.02

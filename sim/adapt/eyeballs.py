@@ -41,7 +41,7 @@ OUTSIDE = 0.8  # mm of lid between eyeball and seen skin, at least, where the re
 
 
 def gaze_turn(eyes, warped) -> np.ndarray:
-    """The rotation (3, 3) that takes the reference's ``eyes`` to the fitted head's; of both, if both look the same way.
+    """The rotation (3, 3) that takes the reference's ``eyes`` to the fitted head's: one, so that both look the same way.
 
     warped : per eye, callable that carries points (k, 3) of the reference into the fitted head
     """
@@ -99,22 +99,21 @@ def place_eye(eye: Eye, warped, turn, reference_skin, fitted_skin, lid, inner, m
     return _moved(eye, centre, radius, gaze)
 
 
-def looking_between_lids(old, new, turns, reference_skin, fitted_skin, margins):
-    """(eyes, turns) that look up or down, all alike, toward where the reference's look between their open lids.
+def looking_between_lids(old, new, turn, reference_skin, fitted_skin, margins):
+    """(eyes, turn) that look up or down, both alike, toward where the reference's look between their open lids.
 
-    old, new : eyes of the reference and of the fitted head; turns, margins : of each, see `gaze_turn` and `Rest.at_iris`
+    old, new : eyes of the reference and of the fitted head; turn, margins : see `gaze_turn` and, of each, `Rest.at_iris`
     """
     rise = []
-    for eye, placed, turn, lids in zip(old, new, turns, margins, strict=True):
+    for eye, placed, lids in zip(old, new, margins, strict=True):
         if len(lids) == 2:
             there = (_middle(fitted_skin, lids) - placed.centre) @ turn, _middle(reference_skin, lids) - eye.centre
             fitted, own = (np.arctan2(arm @ _up(eye), arm @ eye.gaze) for arm in there)
             rise.append(fitted - own)
     look = float(np.clip(LOOKS * np.mean(rise), -MOST_LOOK, MOST_LOOK)) if rise else 0.0
-    turned = [
-        t @ Rotation.from_rotvec(look * np.cross(e.gaze, _up(e))).as_matrix() for e, t in zip(old, turns, strict=True)
-    ]
-    return [replace(e, gaze=t @ o.gaze) for o, e, t in zip(old, new, turned, strict=True)], turned
+    across = np.mean([np.cross(eye.gaze, _up(eye)) for eye in old], axis=0)
+    turn = turn @ Rotation.from_rotvec(look * across).as_matrix()
+    return [replace(placed, gaze=turn @ eye.gaze) for eye, placed in zip(old, new, strict=True)], turn
 
 
 def _middle(skin, margins):

@@ -64,17 +64,15 @@ def follow(
     parts = {name: with_teeth(rest, name, moved, mouth) for name, moved in parts.items()}
 
     yield Progress(0.25, "Eyes and teeth")
-    eyes, turns, carried, skull = [], [], {"mouth": mouth}, parts["skull"]
+    eyes, carried, skull = [], {"mouth": mouth}, parts["skull"]
     both = [near_bone(rest, parts, eye.centre[None], AROUND_EYE) for eye in reference.eyes]
     margins = [rest.at_iris[side] for side in "lr"]
+    turn = eyeballs.gaze_turn(reference.eyes, both)  # of both: by the bone around each, people squint
     for old, around, side, margin in zip(reference.eyes, both, "lr", margins, strict=True):
-        # lids that are shut tell nothing of where an eye looks
-        turn = eyeballs.gaze_turn(reference.eyes, both) if side in rest.slits else eyeballs.gaze_turn((old,), (around,))
         lids = rest.lids(side), rest.inner, margin
-        turns.append(turn)
         eyes.append(eyeballs.place_eye(old, around, turn, start, skin, *lids, scale))
-    eyes, turns = eyeballs.looking_between_lids(reference.eyes, eyes, turns, start, skin, margins)
-    for old, new, around, turn, side in zip(reference.eyes, eyes, both, turns, "lr", strict=True):
+    eyes, turn = eyeballs.looking_between_lids(reference.eyes, eyes, turn, start, skin, margins)
+    for old, new, around, side in zip(reference.eyes, eyes, both, "lr", strict=True):
         skull = eyeballs.with_orbit(skull, new, new.centre - around(old.centre[None])[0])
         carried[f"eye_{side}"] = eyeballs.eye_similarity(old, new, turn)
     parts["skull"] = skull
