@@ -71,7 +71,7 @@ def parser() -> argparse.ArgumentParser:
     relax = "make the face neutral: auto (where the lips are parted; the default), always or never"
     build.add_argument("--relax", choices=RELAX, default="auto", metavar="WHEN", help=relax)
     leave = "what to leave out as no skin: auto (all of it; the default), never, or of these, with commas between: "
-    leave += "depth_jumps, flat_ends, held_by_lips, hair, glasses, beard"
+    leave += "depth_jumps, flat_ends, held_by_lips, hair, glasses, beard, clothing"
     build.add_argument("--leave-out", default="auto", metavar="WHAT", help=leave)
     build.add_argument("-o", "--output", required=True, metavar="HEAD.blend")
 

@@ -45,10 +45,11 @@ def dressing(skin: bpy.types.Object) -> Work:
     scan, shown = _coloured_scan(skin), _as_scanned(skin, head)
     seen = None if scan is None else ScanColour(scan, shown.skin.vertices).turned_to(shown.skin)
     iris = None if seen is None else iris_colour(seen.scan, head.eyes)
-    hidden = bridge.read_attribute(skin.data, "hidden")
+    hidden, clothed = (bridge.read_attribute(skin.data, name) for name in ("hidden", "clothed"))
     if seen is not None:
         at = shown.landmark_positions()
-        seen.trust = shown_skin(seen.points, seen.colour, shown.skin, head.groups, at, head.eyes, hidden, seen.ends)
+        known = shown.skin, head.groups, at, head.eyes, hidden, seen.ends, clothed
+        seen.trust = shown_skin(seen.points, seen.colour, *known)
     objects = heads.parts_of(skin)
     for part, obj in objects.items():
         mesh = head.parts[part]
@@ -56,7 +57,7 @@ def dressing(skin: bpy.types.Object) -> Work:
         if part == "skin":
             yield Progress(0.1, "Painting the skin")
             paint_skin(obj, mesh, head.groups, place, {n: axes @ p for n, p in head.landmark_positions().items()})
-            unseen = unseen_skin(mesh, head.groups["inner"], hidden)
+            unseen = unseen_skin(mesh, head.groups["inner"], hidden, clothed)
             own = yield from portion(_own_skin(skin, shown.skin, seen, unseen), 0.2, 0.85)
             yield Progress(0.85, "Dressing the head")
         elif part in ("eye_l", "eye_r"):

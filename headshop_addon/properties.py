@@ -60,6 +60,11 @@ NO_SKIN = (
     ("HAIR", "Hair", "Leave out hair of the head, a fringe or a cap; scalp and forehead are invented below it"),
     ("GLASSES", "Glasses", "Leave out glasses; what they hide is invented"),
     ("BEARD", "Beard", "Leave out a beard; chin and cheeks are invented below it"),
+    (
+        "CLOTHING",
+        "Clothing",
+        "Leave out clothes about the neck, as their colours tell; the neck is invented below them",
+    ),
 )
 
 

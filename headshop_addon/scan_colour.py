@@ -107,13 +107,14 @@ def _size_for(spacing: float) -> int:
     return SIZE if wanted <= SIZE else min(2 ** int(np.ceil(np.log2(wanted))), LARGE)
 
 
-def unseen_skin(skin: Mesh, inner: np.ndarray, hidden: np.ndarray | None) -> np.ndarray:
-    """(n,) 0..1, skin whose colour no scan tells: what is ``inner`` (n,) 0..1, what is ``hidden`` (n,) bool, under hair for
-    one (None: nothing is), and what is next to that, for there the scan shows the hair."""
-    if hidden is None:
-        return inner
-    beside = adjacency(skin) @ hidden.astype(float) > 0
-    return np.where(hidden | beside, 1.0, inner)
+def unseen_skin(skin: Mesh, inner: np.ndarray, *covered: np.ndarray | None) -> np.ndarray:
+    """(n,) 0..1, skin whose colour no scan tells: what is ``inner`` (n,) 0..1, what is ``covered`` (n,) bool, by hair or
+    clothing (None: nothing is), and what is next to that, for there the scan shows the hair."""
+    for hidden in covered:
+        if hidden is not None:
+            beside = adjacency(skin) @ hidden.astype(float) > 0
+            inner = np.where(hidden | beside, 1.0, inner)
+    return inner
 
 
 def vertex_colour(skin: Mesh, source: ScanColour, unseen: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:

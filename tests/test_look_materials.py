@@ -182,17 +182,20 @@ def test_a_head_is_dressed_in_what_shows_skin(reference, made_of, monkeypatch):
     before = scan.triangles[(scan.vertices[:, 1] < 0)[scan.triangles].all(axis=1)]
     skin = made_of(scan.from_triangles(scan.vertices, before, colour=scan.colour))
     bridge.write_attribute(skin.data, "hidden", reference.groups["scalp"] > 0.5)
+    bridge.write_attribute(skin.data, "clothed", reference.groups["neck"] > 0.5)
     asked, ended = [], []
 
-    def shown(points, colour, mesh, groups, landmarks, eyes, hidden, ends):
-        asked.append((len(mesh.vertices), len(groups["face"]), len(landmarks) > 50, len(eyes), int(hidden.sum())))
+    def shown(points, colour, mesh, groups, landmarks, eyes, hidden, ends, clothed):
+        covered = int(hidden.sum()), int(clothed.sum())
+        asked.append((len(mesh.vertices), len(groups["face"]), len(landmarks) > 50, len(eyes), *covered))
         ended.append(ends)
         return (points[:, 0] < 0).astype(float)
 
     monkeypatch.setattr(materials, "shown_skin", shown)
     materials.dress_head(skin)
     count = len(reference.skin.vertices)
-    assert asked == [(count, count, True, 2, int((reference.groups["scalp"] > 0.5).sum()))]
+    covered = (int((reference.groups[name] > 0.5).sum()) for name in ("scalp", "neck"))
+    assert asked == [(count, count, True, 2, *covered)]
     assert len(ended[0]) > 50
     assert (np.abs(ended[0][:, 1]) < 15).mean() > 0.5  # where it was cut; the rest, lids and lips
     _, pixels = _painted(skin)
@@ -273,11 +276,14 @@ def test_a_coloured_scan_gives_the_head_a_skin_of_its_own(bpy, reference, made_o
     assert image.packed_file is not None, "the colours must travel with the file"
     assert (pixels[:, 0] > pixels[:, 2] + 0.2).mean() > 0.15 and (pixels[:, 2] > pixels[:, 0] + 0.2).mean() > 0.15
     images = len(bpy.data.images)
-    bridge.write_attribute(skin.data, "hidden", reference.skin.vertices[:, 0] > 0)  # as if hair covered all that is red
-    materials.dress_head(skin)
-    assert len(bpy.data.images) == images and skin.data.materials[0] == material
-    _, pixels = _painted(skin)
-    assert (pixels[:, 0] > pixels[:, 2] + 0.2).mean() < 0.03
+    red, nothing = reference.skin.vertices[:, 0] > 0, np.zeros(len(reference.skin.vertices), dtype=bool)
+    for hidden, clothed in ((red, nothing), (nothing, red)):  # as if hair, or clothing, covered all that is red
+        bridge.write_attribute(skin.data, "hidden", hidden)
+        bridge.write_attribute(skin.data, "clothed", clothed)
+        materials.dress_head(skin)
+        assert len(bpy.data.images) == images and skin.data.materials[0] == material
+        _, pixels = _painted(skin)
+        assert (pixels[:, 0] > pixels[:, 2] + 0.2).mean() < 0.03
 
 
 def test_a_relaxed_face_has_the_colours_of_the_one_that_was_scanned(reference, made_of):

@@ -25,9 +25,9 @@ def scanned(reference):
     return points, cKDTree(reference.skin.vertices).query(points)[1], colour
 
 
-def _asked(reference, points, colour, hidden=None, at=None, eyes=None, ends=()):
-    marks = reference.landmark_positions() if at is None else at
-    return shown_skin(points, colour, reference.skin, reference.groups, marks, eyes or reference.eyes, hidden, ends)
+def _asked(reference, points, colour, hidden=None, at=None, eyes=None, ends=(), clothed=None):
+    marks, eyes = reference.landmark_positions() if at is None else at, eyes or reference.eyes
+    return shown_skin(points, colour, reference.skin, reference.groups, marks, eyes, hidden, ends, clothed)
 
 
 def _scalp(reference):
@@ -68,6 +68,22 @@ def test_strands_of_hair_beyond_its_edge_are_not_skin_and_skin_between_them_is(r
     assert (trust[away > 50] == 1).all()
     pale = np.where(strand[:, None], [0.8, 0.75, 0.65], colour)  # hair may be lighter
     assert np.quantile(_asked(reference, points, pale, hidden)[own & (away < 25)], 0.98) < 0.2
+
+
+def test_a_collar_is_told_by_its_own_colour_and_hair_by_its(reference, scanned):
+    """Dark hair and a white collar, both of which go on a little beyond what they are known to cover: their mean is skin's."""
+    points, nearest, colour = scanned
+    hidden, low = _scalp(reference), reference.landmark_positions()["gn"][2] - 60
+    clothed = (reference.groups["neck"] > 0.5) & (reference.skin.vertices[:, 2] < low)
+    strand = hidden[nearest] | ((cKDTree(reference.skin.vertices[hidden]).query(points)[0] < 20) & _stripes(points))
+    collar = points[:, 2] < low + 8
+    colour = np.where(strand[:, None], HAIR, np.where(collar[:, None], 3 * WHITE, colour))
+    trust = _asked(reference, points, colour, hidden, clothed=clothed)
+    own, edge = _inside(points, strand) & ~hidden[nearest], _inside(points, collar) & ~clothed[nearest]
+    assert min(own.sum(), edge.sum()) > 100
+    assert np.quantile(trust[own], 0.95) < 0.2 and np.quantile(trust[edge], 0.95) < 0.2
+    assert trust[_inside(points, ~strand & ~collar)].mean() > 0.95
+    assert np.median(_asked(reference, points, colour, hidden)[edge]) > 0.8  # nobody knows of it
 
 
 def test_what_stands_off_the_head_says_nothing_of_hair_or_skin(reference, scanned):

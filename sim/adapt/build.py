@@ -17,7 +17,7 @@ from ..progress import Progress, Work, portion
 from ..relax.choice import kept_open, neutral_of, require_choice, smiles_closed
 from .bone import depth_under
 from .closest import Surface
-from .fit_sentence import MOST, SMILES_CLOSED, doubts, fit_sentence, fitted_shares, invented
+from .fit_sentence import FITTED, MOST, SMILES_CLOSED, doubts, fit_sentence, fitted_shares, invented
 from .follow import follow
 from .gate import check_against_scan, check_arrangement, check_likeness, check_on_face, check_on_surface, doubted
 from .landmarks import require_usable
@@ -46,7 +46,7 @@ class BuildResult:
     landmarks_missing : names of landmarks that were not given
     attributes : per skin vertex (n,) float32: ``fitted`` 0..1 (0: invented by the warp), ``distance_mm`` to the scan
         (positive outside, NaN where there is no data); and (n,) bool ``hidden``: scalp without data, and skin under hair,
-        under a beard or behind what the lips hold
+        under a beard or behind what the lips hold; ``clothed``: skin under clothing
     detail : displacement and normal map of what is finer than the mesh; None if not asked for
     scanned : (n, 3) mm, the head's skin with the expression that it was scanned with; None where it was not relaxed
     """
@@ -133,6 +133,7 @@ def build_head(
         "fitted": fit.fitted.fitted.astype(np.float32),
         "distance_mm": fit.fitted.distance.astype(np.float32),
         "hidden": fit.unseen | np.isin(np.arange(len(fit.cage)), look.hidden),
+        "clothed": np.isin(np.arange(len(fit.cage)), look.clothed) & (fit.fitted.fitted < FITTED),
     }
     maps = None
     if detail and head.skin.uv is not None:

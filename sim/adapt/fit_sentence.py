@@ -26,6 +26,7 @@ LEFT_OUT = {
     "hair": "hair",
     "glasses": "glasses",
     "beard": "a beard",
+    "clothing": "clothing",
 }
 #: What is advised where a face whose lips are closed seems to smile.
 SMILES_CLOSED = (

@@ -17,8 +17,8 @@ MOST = 600_000  # triangles of a scan that are all looked at: edges of about 0.7
 FEWEST = 300  # triangles of a smaller one, of somebody from head to foot, that are a head
 ROOM = 0.35  # of the head's size that is kept around it
 #: What of a scan may be no skin: what a depth map has stretched over its jumps, where it was cut off, what the lips hold,
-#: hair, glasses, a beard.
-NO_SKIN = ("depth_jumps", "flat_ends", "held_by_lips", "hair", "glasses", "beard")
+#: hair, glasses, a beard, clothes about the neck.
+NO_SKIN = ("depth_jumps", "flat_ends", "held_by_lips", "hair", "glasses", "beard", "clothing")
 
 
 def to_leave_out(choice: str) -> frozenset[str]:

@@ -19,6 +19,7 @@ from ..anatomy.head import Head
 from ..mesh import Mesh
 from ..progress import Work
 from ..relax.mouth_gap import MARKS
+from .clothing import under_clothing
 from .filled_in import filled_in
 from .infant import likelier_space
 from .laid_head import LaidHead, lay_head
@@ -33,7 +34,7 @@ from .under_hair import SKULL
 
 #: Landmarks about which skin is much the same, so that a plausible head does not tell where they are.
 UNTOLD = ("tr", "eu")
-KINDS = ("held_by_lips", "hair", "glasses", "beard")  # of `NO_SKIN`, those that a face tells
+KINDS = ("held_by_lips", "hair", "glasses", "beard", "clothing")  # of `NO_SKIN`, those that a face tells
 FEWEST = 4  # landmarks that tell where the head is
 
 
@@ -41,8 +42,9 @@ FEWEST = 4  # landmarks that tell where the head is
 class FirstLook:
     """landmarks : name -> (3,) mm, those given, without those on a beard or a fringe, and those of lids that are seen; lips :
     about where their landmarks are if they are parted, if only a little, or None; target : the scan without what the lips
-    hold, hair, glasses and beards; left_out : how much of it that is, mm²; filled : with skin behind it, and where it lacks
-    the scalp, as that probably is; hidden (k,) : vertices of the reference's skin that make that up; guessed : name -> (3,)
+    hold, hair, glasses, beards and clothing; left_out : how much of it that is, mm²; filled : with skin behind it, and where it
+    lacks the scalp, as that probably is; hidden (k,) : vertices of the reference's skin that make that up; clothed (k,) : those
+    under clothing, which is not filled; guessed : name -> (3,)
     mm, about where others are; laid : the same of those given that the face tells, where it has them itself."""
 
     landmarks: dict[str, np.ndarray]
@@ -51,6 +53,7 @@ class FirstLook:
     lips: dict[str, np.ndarray] | None = None
     left_out: dict[str, float] = field(default_factory=lambda: dict.fromkeys(KINDS, 0.0))
     hidden: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
+    clothed: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=int))
     guessed: dict[str, np.ndarray] = field(default_factory=dict)
     laid: dict[str, np.ndarray] = field(default_factory=dict)
 
@@ -73,9 +76,9 @@ def first_look(
 ) -> Work:
     """Work returning the `FirstLook` at the scan ``target`` with the landmarks ``given`` (name -> (3,) mm).
 
-    leave_out : of `NO_SKIN`; what the lips hold, glasses, hair, or a beard, is taken for skin where it is not among them
+    leave_out : of `NO_SKIN`; what the lips hold, glasses, hair, beards and clothing are taken for skin if not among them
     found : names of those given that nobody picked: in mid-air they are guesses, and of an infant they tell nothing
-    scan : its vertices, mm, and their colours, which tell whether eyes are open
+    scan : its vertices, mm, and their colours, which tell whether eyes are open, and clothing
     """
     rest = reference.landmark_positions()
     names = [name for name in given if name in rest]
@@ -101,13 +104,14 @@ def first_look(
     guessed = {n: p for n, p in laid.items() if n not in landmarks and n.partition("_")[0] not in untold}
     left = skin_left(head, given, leave_out)
     filled = filled_in(head, left, known, clear, found, leave_out)
-    fringe, glasses, beard = (float(thing.area.sum()) for thing in (head.fringe, head.glasses, head.beard))
-    out = dict(zip(KINDS, (left.held_area, left.hair_area + fringe, glasses, beard), strict=True))
+    things = head.fringe, head.glasses, head.beard, head.clothing
+    fringe, *others = (float(thing.area.sum()) for thing in things)
+    out = dict(zip(KINDS, (left.held_area, left.hair_area + fringe, *others), strict=True))
     landmarks = {n: p for n, p in landmarks.items() if n not in filled.misled}
     guessed |= {n: laid[n] for n in filled.misled}
     own = {n: places[n] for n in clear if n in places}
-    hidden = head.space.vertices[filled.hidden]
-    return FirstLook(landmarks, left.surface, filled.surface, lips, out, hidden, guessed, own)
+    hidden, clothed = (head.space.vertices[points] for points in (filled.hidden, under_clothing(head, left.surface)))
+    return FirstLook(landmarks, left.surface, filled.surface, lips, out, hidden, clothed, guessed, own)
 
 
 def _landmarks_of(head: LaidHead):

@@ -16,6 +16,7 @@ from ..mesh import Mesh
 from ..progress import Work, portion
 from .above_beard import without_beards_lead
 from .beards import beard_over
+from .clothing import clothing_over
 from .confidence import in_mid_air
 from .expression import fit_expression
 from .fringe import fit_without_fringe, left_beside
@@ -34,9 +35,9 @@ LOOKING = "Looking at lids and lips"
 @dataclass(frozen=True, eq=False)
 class LaidHead:
     """space : shapes of such heads; fit : one laid on the scan, with the expression ``shown``; hair : what is under hair;
-    target : the scan without ``beard``, ``fringe`` and ``glasses``, which lie over its skin (without triangles where there is
-    none); coarse : the target with fewer triangles; fringed (n,) bool : the points of the skin under the fringe; ends_at_jaw :
-    whether the scan may end above the chin, for all that landmarks and a beard tell."""
+    target : the scan without ``beard``, ``fringe``, ``glasses`` and ``clothing``, which lie over its skin (without triangles
+    where there is none); coarse : the target with fewer triangles; fringed (n,) bool : the points of the skin under the fringe;
+    ends_at_jaw : whether the scan may end above the chin, for all that landmarks and a beard tell."""
 
     space: ShapeSpace
     fit: ShapeFit
@@ -47,6 +48,7 @@ class LaidHead:
     beard: Surface
     fringe: Surface
     glasses: Surface
+    clothing: Surface
     fringed: np.ndarray
     ends_at_jaw: bool
 
@@ -113,8 +115,11 @@ def lay_head(
     if space.of_infants:
         fit = yield from run(with_mouth_in_place(space, left.coarse, fit), 0.58, 0.6, LOOKING)
     fit, shown = yield from run(fit_expression(space, left.coarse, fit, scan), 0.6, 0.9, LOOKING)
+    clothing = left.take(clothing_over(space, fit, left.target, scan if "clothing" in leave_out else None))
     skull = [n for n in given if n.partition("_")[0] in SKULL and n in space.names and n not in found]
     off = in_mid_air(left.target, np.reshape([given[n] for n in skull], (-1, 3)))
     known = {n: given[n] for n in np.array(skull)[off]}
     hair = yield from run(fit_under_hair(space, haired, fit, shown, given, known, fringed), 0.9, 1.0, LOOKING)
-    return LaidHead(space, fit, shown, hair, left.target, left.coarse, on_beard, fringe, glasses, fringed, ends_at_jaw)
+    return LaidHead(
+        space, fit, shown, hair, left.target, left.coarse, on_beard, fringe, glasses, clothing, fringed, ends_at_jaw
+    )

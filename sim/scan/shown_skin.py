@@ -49,11 +49,12 @@ AROUND = 12  # cells that are averaged
 DARKEST = 0.002  # linear light, beneath which colours are noise
 
 
-def shown_skin(points, colour, skin: Mesh, groups, landmarks, eyes, hidden, ends=()) -> np.ndarray:
+def shown_skin(points, colour, skin: Mesh, groups, landmarks, eyes, hidden, ends=(), clothed=None) -> np.ndarray:
     """(k,) 0..1: how far ``points`` (k, 3) mm of a scan with linear colours (k, 3) show skin, as far as can be told.
 
     skin : the head's, where the scan is, upright, facing -Y, with its ``groups`` of vertices, name -> (n,) 0..1
-    landmarks : name -> (3,) mm; eyes : of the head, left and right; hidden : (n,) bool, covered skin, or None
+    landmarks : name -> (3,) mm; eyes : of the head, left and right; hidden, clothed : (n,) bool, skin under hair and the like,
+    and skin under clothing, each covered by what has a colour, or None
     ends : (m, 3) mm, where the scan ends, see `mesh.ends_of`
     """
     if not len(points):
@@ -61,10 +62,11 @@ def shown_skin(points, colour, skin: Mesh, groups, landmarks, eyes, hidden, ends
     at, mean, count = _cells(points, colour)
     light = np.log(np.maximum(mean, DARKEST))
     trust = 1 - _specks(at, light, skin, groups)
-    if hidden is not None:
-        ear = (landmarks["t_l"] + landmarks["t_r"]) / 2
-        beard = (at[:, 2] < ear[2]) & (at[:, 1] < ear[1])
-        trust *= 1 - _cover(at, light, skin, groups, np.asarray(hidden, dtype=bool), beard)
+    ear = (landmarks["t_l"] + landmarks["t_r"]) / 2
+    beard = (at[:, 2] < ear[2]) & (at[:, 1] < ear[1])
+    for covered in (hidden, clothed):
+        if covered is not None and np.any(covered):
+            trust *= 1 - _cover(at, light, skin, groups, np.asarray(covered, dtype=bool), beard)
     trust *= 1 - _at_ends(at, light, skin, groups, landmarks, np.reshape(ends, (-1, 3)))
     for side, eye in zip("lr", eyes, strict=True):
         if np.linalg.norm(landmarks[f"ps_{side}"] - landmarks[f"pi_{side}"]) > OPEN:

@@ -1,0 +1,144 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Clothes about the neck are told by their colour, left out, and neither shape nor stain the neck."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+from headshop.sim.adapt.build import build_head
+from headshop.sim.adapt.closest import Surface
+from headshop.sim.adapt.landmarks import read_landmarks
+from headshop.sim.adapt.scan_surface import NO_SKIN
+from headshop.sim.landmarks.clothing import clothing_over
+from headshop.sim.landmarks.first_look import first_look
+from headshop.sim.landmarks.shape_space import shape_space
+from headshop.sim.mesh import Mesh, vertex_normals
+from headshop.sim.progress import finish
+from headshop.sim.scan.clean import clean_scan
+
+SKIN = np.array([0.75, 0.55, 0.45])
+CLOTHS = {"white": (0.9, 0.9, 0.88), "black": (0.06, 0.06, 0.065), "navy": (0.1, 0.14, 0.3), "red": (0.6, 0.08, 0.1)}
+
+
+@pytest.fixture(scope="module")
+def dressed(reference, seen_skin, laid):
+    """``dressed(cloth, where)`` -> of the reference's skin in unevenly lit colours, with cloth of that colour ``where`` (n,)
+    bool its vertices are: what is left out (m,) bool, the surface and the scan."""
+    space, (target, _) = shape_space(reference), seen_skin()
+    head = laid(space, reference.skin.vertices[space.vertices])
+
+    def make(cloth, where, scan=None):
+        colour = np.where(where[:, None], cloth, SKIN) * _light(target.vertices)
+        scan = scan or Mesh.from_triangles(target.vertices, target.triangles, colour=np.clip(colour, 0, 1))
+        return clothing_over(space, head, target, scan), target, scan
+
+    return make
+
+
+def _light(points):
+    """(n, 1) half as light on one side as on the other, with a little noise."""
+    noise = np.random.default_rng(2).normal(0, 0.02, (len(points), 1))
+    return np.clip(0.75 + points[:, :1] / 300, 0.5, 1) + noise
+
+
+def _shirt(reference, points):
+    """(n,) bool: below a collar that rises from before the neck to behind it."""
+    at = reference.landmark_positions()["gn"]
+    return points[:, 2] < at[2] - 45 + 0.35 * (points[:, 1] - at[1])
+
+
+def _wholly(target, where):
+    """(m,) bool: the triangles all of whose corners are ``where`` (n,) bool, and those none of whose corners are near those."""
+    away = cKDTree(target.vertices[where]).query(target.vertices)[0]
+    return where[target.triangles].all(axis=1), (away[target.triangles] > 16).all(axis=1)
+
+
+@pytest.mark.parametrize("cloth", CLOTHS)
+def test_a_shirt_is_left_out_and_the_skin_above_it_is_not(reference, seen_skin, dressed, cloth):
+    where = _shirt(reference, seen_skin()[0].vertices)
+    out, target, _ = dressed(CLOTHS[cloth], where)
+    cloth, skin = _wholly(target, where)
+    assert min(cloth.sum(), skin.sum()) > 300
+    assert out[cloth].all() and not out[skin].any()
+
+
+def test_skin_is_no_clothing(reference, seen_skin, dressed):
+    """Nor is it in the shade, nor a tattoo, nor what looks like skin, nor anything without a colour."""
+    points = seen_skin()[0].vertices
+    shirt, none = _shirt(reference, points), np.zeros(len(points), dtype=bool)
+    assert not dressed(SKIN, none)[0].any()
+    assert not dressed(0.5 * SKIN, shirt)[0].any()
+    tattoo = np.linalg.norm(points - reference.landmark_positions()["gn"] - [0, 35, -25], axis=1) < 22
+    assert tattoo.sum() > 3 and not dressed(CLOTHS["navy"], tattoo)[0].any()
+    _, target, scan = dressed(CLOTHS["navy"], shirt)
+    assert not dressed(SKIN, none, replace(scan, colour=None))[0].any()
+    blank = replace(scan, colour=np.where(shirt[:, None], 1.0, scan.colour))
+    assert not dressed(SKIN, none, blank)[0].any()
+    face = reference.landmark_positions()["sn"]
+    unlike = replace(scan, colour=np.where((np.linalg.norm(points - face, axis=1) < 90)[:, None], scan.colour, 1.0))
+    assert not dressed(SKIN, none, unlike)[0].any()  # a face without a neck
+
+
+def test_what_a_shirt_cuts_off_goes_with_it(reference, seen_skin, dressed):
+    """A print in the colour of skin."""
+    points = seen_skin()[0].vertices
+    shirt = _shirt(reference, points)
+    inside = cKDTree(points[~shirt]).query(points)[0]
+    print_ = np.linalg.norm(points - points[np.argmax(inside)], axis=1) < 0.6 * inside.max()
+    out, target, _ = dressed(CLOTHS["navy"], shirt & ~print_)
+    printed = print_[target.triangles].all(axis=1)
+    assert printed.sum() > 10 and out[printed].all()
+
+
+def test_a_first_look_leaves_it_out_unless_told_not_to(reference, seen_skin, dressed):
+    target, marks = seen_skin()
+    shirt = _shirt(reference, target.vertices)
+    _, _, scan = dressed(CLOTHS["navy"], shirt)
+    look = finish(first_look(reference, target, marks, scan=scan))
+    all_of_it = float(target.area[shirt[target.triangles].all(axis=1)].sum())
+    assert all_of_it < look.left_out["clothing"] < 1.4 * all_of_it
+    assert sum(look.left_out.values()) == look.left_out["clothing"]
+    assert not _shirt(reference, look.target.vertices).any()
+    neck = reference.groups["neck"] > 0.5
+    assert neck[look.clothed].mean() > 0.9 and len(look.clothed) > 200
+    kept = finish(first_look(reference, target, marks, set(NO_SKIN) - {"clothing"}, scan=scan))
+    assert kept.left_out["clothing"] == 0 and len(kept.clothed) == 0
+    assert len(kept.target.triangles) == len(target.triangles)
+
+
+def test_a_thick_collar_does_not_shape_the_neck(reference, seen_skin, dressed):
+    """The neck below is nearer to the skin than to the collar, which stands off it by 8 mm; colours do not come from it."""
+    target, marks = seen_skin()
+    shirt = _shirt(reference, target.vertices)
+    _, _, scan = dressed(CLOTHS["red"], shirt)
+    thick = target.vertices + 8 * shirt[:, None] * vertex_normals(target.vertices, target.triangles)
+    scan = replace(scan, vertices=thick)
+    built = {choice: finish(build_head(reference, scan, marks, 0, leave_out=choice)) for choice in ("auto", "never")}
+    clothed = built["auto"].attributes["clothed"]
+    assert clothed.sum() > 200 and not built["never"].attributes["clothed"].any()
+    assert not built["auto"].attributes["fitted"][clothed].any()
+    assert "clothing" in built["auto"].fit["sentence"] and "neck" in built["auto"].fit["invented"]
+    off = {
+        choice: Surface(reference.skin.vertices, reference.skin.triangles)
+        .closest(each.head.skin.vertices[clothed])
+        .distance
+        for choice, each in built.items()
+    }
+    assert np.median(off["auto"]) < 3 < 6 < np.median(off["never"])
+
+
+def test_the_collar_of_a_photographed_man_does_not_stay(shared, reference):
+    from headshop.headshop_addon.scan_import import read_scan
+
+    path = shared / "scans" / "menpo_james.ply"
+    scan = clean_scan(read_scan(path))[0]
+    marks = read_landmarks(path.with_suffix(".landmarks.json"))
+    look = finish(first_look(reference, Surface(scan.vertices, scan.triangles, 2.0), marks, scan=scan))
+    assert 4000 < look.left_out["clothing"] < 9000
+    throats = []
+    for vertices, triangles in ((scan.vertices, scan.triangles), (look.target.vertices, look.target.triangles)):
+        middle = vertices[triangles].mean(axis=1)
+        throats.append((np.linalg.norm(middle - marks["gn"] - [0, 40, -30], axis=1) < 20).sum())
+    assert throats[0] == throats[1] > 10
