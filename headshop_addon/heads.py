@@ -76,6 +76,7 @@ def _add_part(collection, head: Head, part: str, name: str) -> bpy.types.Object:
 def _add_muscles(collection, head: Head, name: str) -> list[bpy.types.Object]:
     child = bpy.data.collections.new(f"{name} Muscles")
     collection.children.link(child)
+    child.hide_render = True  # they stay where they are when the face moves, and would come through it
     objects = []
     for muscle in head.muscles:
         obj = bridge.mesh_to_object(muscle.shape, f"{name} {muscle.name}")

@@ -161,6 +161,8 @@ def build(
             (scene or bpy.context.scene).collection.objects.unlink(scan_object)
             scan_object.hide_viewport = True
         skin = next(obj for obj in collection.objects if heads.is_skin(obj))
+        for child in collection.children:
+            child.hide_viewport = True  # muscles: they stay where they are when the face moves
         if result.scanned is not None:
             shape_keys.keep_as_scanned(skin, result.scanned)
         if result.detail is not None:

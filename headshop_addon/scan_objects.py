@@ -20,7 +20,7 @@ from ..sim.landmarks.find import FoundLandmarks
 from ..sim.progress import Work, finish
 from ..sim.scan.orientation import FOUND, Orientation, axis_names, detect, read_as
 from ..sim.scan.units import BY_FACE, PLAUSIBLE, UNITS, USUAL, unit_words
-from . import active, bridge, heads, heat_map, mesh_follow, pipeline, scan_landmarks
+from . import bridge, heads, heat_map, mesh_follow, pipeline, scan_landmarks
 from .mesh_follow import TURN
 from .shown_objects import as_one
 
@@ -265,9 +265,6 @@ def build(context, scan: bpy.types.Object, name: str = "") -> Work:
     skin.matrix_world = scan.matrix_world
     scan.hide_viewport = True
     _take_over(context.scene, scan, skin)
-    muscles = active.muscles_collection(skin)
-    if muscles is not None:
-        muscles.hide_viewport = True  # they stay where they are when the face moves
     context.scene.headshop.head = skin
     select(context, skin)
     return skin, report

@@ -77,6 +77,7 @@ def _show(layout, context, skin):
     muscles = active.muscles_collection(skin)
     if muscles is not None:
         row.prop(muscles, "hide_viewport", text="Muscles", toggle=True, invert_checkbox=True)
+        row.prop(muscles, "hide_render", text="", toggle=True, invert_checkbox=True)
     scan = heads.scan_of(skin)
     # A deleted one stays in the file while the head knows it.
     if scan is not None and scan.name in context.scene.objects:
