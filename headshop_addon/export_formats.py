@@ -45,6 +45,7 @@ def _glb(path: str, animated: bool) -> None:
         export_morph_normal=True,
         export_animations=animated,
         export_animation_mode="SCENE",
+        export_anim_scene_split_object=False,  # one clip: an engine that plays the skin's alone leaves eyes and teeth behind
         export_cameras=False,
         export_lights=False,
     )

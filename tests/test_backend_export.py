@@ -128,3 +128,25 @@ def test_no_shapes_file_before_a_bake(bpy, reference, tmp_path):
     heads.create_head(reference, "Fran")
     write_plain(heads.find_heads()[0], tmp_path)
     assert "shapes.npz" not in [p.name for p in tmp_path.iterdir()]
+
+
+def test_a_performance_is_one_clip_that_moves_all_parts(bpy, skin, tmp_path, reference):
+    """An engine plays one clip: with a clip a part, eyes, teeth and tongue would stand still."""
+    import struct
+
+    from headshop.headshop_addon import performance
+    from headshop.headshop_addon.export import export_head
+    from headshop.sim.acting.principal import principal_shapes
+
+    motion = {part: np.zeros((3, *reference.parts[part].vertices.shape)) for part in ("skin", "tongue", "eye_l")}
+    for each in motion.values():
+        each[2] = 1.0
+    frames = np.arange(1, 4)
+    performance.write_performance(
+        skin, {p: principal_shapes(m, 0.001) for p, m in motion.items()}, frames, "Performance"
+    )
+    export_head(skin, tmp_path / "fran.glb")
+    data = (tmp_path / "fran.glb").read_bytes()
+    (size,) = struct.unpack("<I", data[12:16])
+    clips = json.loads(data[20 : 20 + size])["animations"]
+    assert [len(clip["channels"]) for clip in clips] == [3]
