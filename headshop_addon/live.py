@@ -75,7 +75,10 @@ def key_sliders(skin, frame: int) -> None:
 
 def follow(skin, depsgraph=None) -> None:
     """Bring the head to where its sliders say; does nothing while paused, switched off, or not a head."""
-    if _depth or not heads.is_skin(skin) or not skin.headshop.live or skin.library or skin.mode != "OBJECT":
+    if _depth or not heads.is_skin(skin):
+        return
+    _let_override(skin)
+    if not skin.headshop.live or skin.library or skin.mode != "OBJECT":
         return
     if not dependencies.available("scipy"):
         return
@@ -85,6 +88,18 @@ def follow(skin, depsgraph=None) -> None:
         now.rounds = 0
         if not bpy.app.timers.is_registered(_settle):
             bpy.app.timers.register(_settle, first_interval=0.2)
+
+
+def _let_override(skin) -> None:
+    """Where a library override acts, let the head that it overrides have sliders too.
+
+    Blender keeps what a shot says of a slider as a difference from the library's. A head whose sliders nobody touched in the
+    library has none stored; the difference would be the whole group, which Blender writes but cannot read again: every slider
+    would be 0 when the shot is opened. Reading a group makes it.
+    """
+    linked = skin.override_library.reference if skin.override_library else None
+    if heads.is_skin(linked):
+        _ = linked.headshop.muscles, linked.headshop.controls
 
 
 def _settle():
@@ -134,6 +149,15 @@ def _on_history(*_):
 @persistent
 def _on_load(*_):
     following.kept.clear()
+    for skin in heads.find_heads(bpy.context.scene):
+        if skin.data.library and not skin.library:  # an override: the pose is on a mesh that this file does not keep
+            follow(skin, bpy.context.evaluated_depsgraph_get())
+
+
+@persistent
+def _on_save(*_):
+    for skin in filter(heads.is_skin, bpy.data.objects):
+        _let_override(skin)
 
 
 _HANDLERS = (
@@ -141,6 +165,7 @@ _HANDLERS = (
     ("undo_post", _on_history),
     ("redo_post", _on_history),
     ("load_post", _on_load),
+    ("save_pre", _on_save),
 )
 
 

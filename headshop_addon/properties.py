@@ -146,6 +146,7 @@ class HEADSHOP_PG_object(bpy.types.PropertyGroup):
         description="The face follows the sliders. Off: the sliders move nothing, baked shape keys play alone",
         default=True,
         options=set(),
+        override={"LIBRARY_OVERRIDABLE"},
         update=live.on_switch,
     )
     model: EnumProperty(
@@ -153,6 +154,7 @@ class HEADSHOP_PG_object(bpy.types.PropertyGroup):
         description="What moves the face under the sliders. Bakes are always simulated",
         items=MODELS,
         options=set(),
+        override={"LIBRARY_OVERRIDABLE"},
         update=live.on_model,
     )
     dynamics: BoolProperty(
@@ -160,6 +162,7 @@ class HEADSHOP_PG_object(bpy.types.PropertyGroup):
         description="In Keyed Sliders to Animation, flesh swings: it feels the scene's gravity, the motion of the head's "
         "object and wind. Off: it comes to rest in every frame",
         options=set(),
+        override={"LIBRARY_OVERRIDABLE"},
     )
     wind: FloatVectorProperty(
         name="Wind",
@@ -168,6 +171,7 @@ class HEADSHOP_PG_object(bpy.types.PropertyGroup):
         subtype="VELOCITY",
         unit="VELOCITY",
         options=set(),
+        override={"LIBRARY_OVERRIDABLE"},
     )
     turbulence: FloatProperty(
         name="Turbulence",
@@ -176,14 +180,22 @@ class HEADSHOP_PG_object(bpy.types.PropertyGroup):
         max=1.0,
         subtype="FACTOR",
         options=set(),
+        override={"LIBRARY_OVERRIDABLE"},
     )
-    wind_seed: IntProperty(name="Seed", description="Another seed, other gusts", min=0, options=set())
+    wind_seed: IntProperty(
+        name="Seed",
+        description="Another seed, other gusts",
+        min=0,
+        options=set(),
+        override={"LIBRARY_OVERRIDABLE"},
+    )
     detail: EnumProperty(
         name="Detail",
         description="How the scan's fine detail is shown, which the mesh cannot follow",
         items=DETAIL,
         default="NORMAL",
         options=set(),
+        override={"LIBRARY_OVERRIDABLE"},
         update=_on_detail,
     )
     show_fit: BoolProperty(

@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Heads in shots: linked and overridden, several of one kind, duplicated, moved by drivers and NLA strips."""
+
+import numpy as np
+import pytest
+
+
+@pytest.fixture
+def whole(addon, reference):
+    """The skin of a head made of the reference, whose muscles displace the skin directly: fast."""
+    from headshop.headshop_addon import heads
+
+    heads.create_head(reference, "Ref")
+    skin = heads.find_heads()[0]
+    skin.headshop.model = "DIRECT"
+    return skin
+
+
+@pytest.fixture
+def library(addon, reference, tmp_path):
+    """Path of a .blend with a head whose sliders nobody touched, and that no session with the extension made."""
+    from headshop.headshop_addon import heads
+
+    heads.create_head(reference, "Ref")
+    path = str(tmp_path / "ref.blend")
+    addon.ops.wm.save_as_mainfile(filepath=path)
+    addon.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    return path
+
+
+def overridden(bpy, path):
+    """The skin of a library override of the head in a .blend, in the scene."""
+    from headshop.headshop_addon import heads
+
+    with bpy.data.libraries.load(path, link=True) as (_, wanted):
+        wanted.collections = ["Ref"]
+    made = wanted.collections[0].override_hierarchy_create(
+        bpy.context.scene, bpy.context.view_layer, do_fully_editable=True
+    )
+    skin = next(obj for obj in made.objects if heads.is_skin(obj))
+    bpy.context.view_layer.update()
+    skin.headshop.model = "DIRECT"
+    return skin
+
+
+def reopened(bpy, tmp_path):
+    """Save the shot and open it again."""
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "shot.blend"))
+
+
+def moved(skin, part="skin") -> float:
+    """Largest motion of a part in the live pose, mm."""
+    from headshop.headshop_addon import bridge, following, heads
+
+    obj = heads.parts_of(skin)[part]
+    keys = obj.data.shape_keys
+    if keys is None or following.KEY not in keys.key_blocks:
+        return 0.0
+    delta = bridge.read_positions(obj, following.KEY) - bridge.read_positions(obj)
+    return float(np.linalg.norm(delta, axis=1).max())
+
+
+def duplicate(bpy, objects, linked=False):
+    """Shift-D or Alt-D."""
+    for obj in bpy.context.view_layer.objects:
+        obj.select_set(False)
+    for obj in objects:
+        obj.select_set(True)
+    bpy.context.view_layer.objects.active = objects[0]
+    bpy.ops.object.duplicate(linked=linked)
+
+
+def test_an_overridden_head_opens_as_the_shot_was_saved(addon, library, tmp_path):
+    from headshop.headshop_addon import heads
+
+    skin = overridden(addon, library)
+    skin.headshop.muscles.zygomaticus_major_l = 0.7
+    skin.headshop.controls.jaw_open = 0.5
+    before = moved(skin), moved(skin, "mandible")
+    assert min(before) > 1
+    reopened(addon, tmp_path)
+    skin = heads.find_heads()[0]
+    assert skin.override_library and skin.headshop.model == "DIRECT"
+    assert skin.headshop.muscles.zygomaticus_major_l == pytest.approx(0.7)
+    assert skin.headshop.controls.jaw_open == pytest.approx(0.5)
+    assert (moved(skin), moved(skin, "mandible")) == pytest.approx(before, abs=1e-3)
+
+
+def test_a_slider_of_an_override_that_only_a_script_with_the_face_switched_off_set_is_kept_too(
+    addon, library, tmp_path
+):
+    from headshop.headshop_addon import heads
+
+    skin = overridden(addon, library)
+    skin.headshop.live = False
+    skin.headshop.controls.gaze_x = 0.5
+    reopened(addon, tmp_path)
+    skin = heads.find_heads()[0]
+    assert skin.headshop.controls.gaze_x == 0.5 and not skin.headshop.live and moved(skin, "eye_l") == 0
