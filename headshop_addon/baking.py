@@ -109,6 +109,7 @@ def remove_baked(skin: bpy.types.Object) -> None:
     InputError : linked from another file.
     """
     shape_keys.require_editable(skin)
+    heads.own_meshes(skin)
     moved = rig_keys.is_rigged(skin) or performance.PERFORMANCE in skin
     rig_keys.remove_rig(skin)
     performance.remove_performance(skin)

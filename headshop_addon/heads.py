@@ -217,6 +217,29 @@ def placement(skin: bpy.types.Object, obj: bpy.types.Object) -> np.ndarray:
     return np.array(obj.matrix_parent_inverse @ obj.matrix_basis, dtype=float)
 
 
+def own_meshes(skin: bpy.types.Object) -> None:
+    """Give a head meshes of its own where another head wears the same ones: a duplicate with linked data, or a second library
+    override of one head. What moves one of them would move the other."""
+    parts = list(parts_of(skin).values())
+    if all(obj.data.users == 1 for obj in parts):
+        return
+    others = {
+        o.data for o in bpy.data.objects if o.type == "MESH" and o.library is None and o not in parts and PART in o
+    }
+    shared = [obj for obj in parts if obj.data in others and obj.library is None]
+    before = skin.data.shape_keys
+    for obj in shared:
+        obj.data = obj.data.copy()
+    if skin not in shared or before is None:
+        return
+    for obj in shared:  # keys that follow the skin's are to follow the new skin's
+        keys = obj.data.shape_keys
+        for curve in keys.animation_data.drivers if keys and keys.animation_data else ():
+            for target in (target for variable in curve.driver.variables for target in variable.targets):
+                if target.id == before:
+                    target.id = skin.data.shape_keys
+
+
 def write_report(skin: bpy.types.Object, report: dict) -> None:
     """Keep the build's report with the head."""
     skin[REPORT] = json.dumps(report)

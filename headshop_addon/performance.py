@@ -123,6 +123,7 @@ def _in_time(acting, built, controls, fps):
 
 def write_performance(skin, found: dict, frames: np.ndarray, name: str) -> None:
     """Store part -> `Principal` as shape keys of each part and one action with a slot for each."""
+    heads.own_meshes(skin)
     remove_performance(skin)
     action = new_action(f"{heads.head_name(skin)} {name}")
     for part, obj in heads.parts_of(skin).items():

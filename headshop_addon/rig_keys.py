@@ -56,6 +56,7 @@ def bake_rig(skin: bpy.types.Object) -> Work:
 
 def write_rig(skin: bpy.types.Object, keys: Keys) -> None:
     """Store `Keys` as shape keys with drivers, in place of an earlier rig and of our keys by the sliders' names."""
+    heads.own_meshes(skin)
     remove_rig(skin)
     parts = heads.parts_of(skin)
     for part, each in keys.parts.items():

@@ -145,6 +145,7 @@ def refuse_foreign(skin: bpy.types.Object, names) -> None:
 
 def write_shapes(skin: bpy.types.Object, shapes: dict[str, dict[str, np.ndarray]], report: dict[str, dict]) -> None:
     """Store name -> part -> displacements (n, 3) mm as shape keys with drivers, in place of ours of the same names."""
+    heads.own_meshes(skin)
     parts = heads.parts_of(skin)
     for part, obj in parts.items():
         moving = {

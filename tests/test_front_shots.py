@@ -98,3 +98,36 @@ def test_a_slider_of_an_override_that_only_a_script_with_the_face_switched_off_s
     reopened(addon, tmp_path)
     skin = heads.find_heads()[0]
     assert skin.headshop.controls.gaze_x == 0.5 and not skin.headshop.live and moved(skin, "eye_l") == 0
+
+
+def test_two_overrides_of_one_head_move_each_for_itself(addon, library, tmp_path):
+    from headshop.headshop_addon import heads
+
+    one, other = overridden(addon, library), overridden(addon, library)
+    assert one.data == other.data
+    one.headshop.controls.gaze_x = 1.0
+    other.headshop.controls.jaw_open = 0.5
+    reopened(addon, tmp_path)
+    one, other = heads.find_heads()
+    assert moved(one, "eye_l") > 5 and moved(one, "mandible") == 0
+    assert moved(other, "eye_l") == 0 and moved(other, "mandible") > 5
+
+
+def test_a_linked_duplicate_moves_for_itself_and_keeps_its_baked_shapes(addon, whole):
+    from headshop.headshop_addon import baking, bridge, heads, shape_keys
+
+    still = np.zeros((len(heads.parts_of(whole)["mandible"].data.vertices), 3))
+    pose = {"joy": {"skin": np.ones((len(whole.data.vertices), 3)), "mandible": still + 1}}
+    shape_keys.write_shapes(whole, pose, {"joy": {"peak_mm": 1.0}})
+    duplicate(addon, [whole, *whole.children], linked=True)
+    copy = next(skin for skin in heads.find_heads() if skin != whole)
+    assert copy.data == whole.data
+    copy.headshop.controls.gaze_x = 1.0
+    assert moved(copy, "eye_l") > 5 and moved(whole, "eye_l") == 0
+    jaw = heads.parts_of(copy)["mandible"].data.shape_keys
+    assert jaw.animation_data.drivers[0].driver.variables[0].targets[0].id == copy.data.shape_keys
+    baking.remove_baked(copy)
+    assert "joy" in whole.data.shape_keys.key_blocks
+    assert bridge.read_positions(whole, "joy").mean() - bridge.read_positions(whole).mean() == pytest.approx(
+        1, abs=1e-3
+    )
