@@ -14,7 +14,7 @@ class BakeJob(Job):
     @classmethod
     def poll(cls, context):
         """Needs a head and the simulation."""
-        return polls.library(cls, "scipy") and polls.head(cls, context) and polls.object_mode(cls, context)
+        return polls.library(cls, "scipy") and polls.own_head(cls, context) and polls.object_mode(cls, context)
 
     def work(self, context):
         """Simulate and write."""

@@ -168,7 +168,14 @@ def _objects_of(skin):
     children = list(skin.children)
     pointers = skin.get(_POINTERS)
     pointed = [obj for obj in pointers.values() if obj is not None] if pointers else []
-    return children or pointed
+    return children or [obj for obj in pointed if not _is_of_another(obj, skin)]
+
+
+def _is_of_another(obj, skin) -> bool:
+    """Whether a part that a skin points at belongs to another head: a skin that was duplicated alone still points at the
+    parts of the head it came from, which must stay as they are. The head that a library override overrides is no other."""
+    overridden = skin.override_library.reference if skin.override_library else None
+    return is_skin(obj.parent) and obj.parent not in (skin, overridden)
 
 
 def read_head(skin: bpy.types.Object) -> Head:
@@ -181,11 +188,8 @@ def read_head(skin: bpy.types.Object) -> Head:
     if not is_skin(skin):
         raise InputError(f"{getattr(skin, 'name', 'Nothing')} is not the skin of a head: choose a head that was built.")
     objects = parts_of(skin)
-    absent = [part for part in PARTS if part not in objects]
-    if absent:
-        raise InputError(
-            f"The head {skin.name!r} has lost its {', '.join(absent)}: undo the deletion or append the head again."
-        )
+    if why := lacking(skin):
+        raise InputError(why)
     parts = {part: _read_part(skin, obj) for part, obj in objects.items()}
     groups = {name: weights for name, weights in bridge.read_groups(skin).items() if name in SKIN_GROUPS}
     try:
@@ -193,6 +197,18 @@ def read_head(skin: bpy.types.Object) -> Head:
     except (ValueError, TypeError):
         raise InputError(f"The anatomy stored on {skin.name!r} cannot be read: build the head again.") from None
     return head_from_document(parts, groups, document)
+
+
+def lacking(skin: bpy.types.Object) -> str:
+    """What is wrong with a head that has lost parts or never had them, and what to do; empty for a whole one."""
+    objects = parts_of(skin)
+    absent = ", ".join(part for part in PARTS if part not in objects)
+    if not absent:
+        return ""
+    return (
+        f"The head {skin.name!r} has no {absent}: undo their deletion, append the head again, or duplicate it with all its "
+        "children (Select, Select Grouped, Children)."
+    )
 
 
 def _read_part(skin, obj):

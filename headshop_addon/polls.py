@@ -3,6 +3,9 @@
 
 from . import active, dependencies
 
+#: Why a head that was linked does not move, and what to do.
+LINKED = "This head is linked from another file: make a library override of its collection first"
+
 
 def library(cls, name: str) -> bool:
     """A Python library is there."""
@@ -24,6 +27,16 @@ def scan(cls, context) -> bool:
     """There is a scan."""
     if active.scan(context) is None:
         cls.poll_message_set("Import a scan first")
+        return False
+    return True
+
+
+def own_head(cls, context) -> bool:
+    """There is a head, and this file may change its sliders."""
+    if not head(cls, context):
+        return False
+    if active.skin(context).library is not None:
+        cls.poll_message_set(LINKED)
         return False
     return True
 

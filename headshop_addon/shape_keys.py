@@ -105,7 +105,10 @@ def require_editable(skin: bpy.types.Object) -> None:
     linked = [obj.name for obj in heads.parts_of(skin).values() if obj.data.library is not None]
     if linked:
         name = heads.head_name(skin)
-        raise InputError(f"The meshes of {name!r} are linked from another file: make them local, or bake in that file.")
+        raise InputError(
+            f"The meshes of {name!r} are linked from another file: make them local (Object, Relations, Make Local, Selected "
+            "Objects and Data), or bake in that file."
+        )
 
 
 def baked_names(obj: bpy.types.Object) -> list[str]:

@@ -23,8 +23,8 @@ class HEADSHOP_OT_bake_performance(Job, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        """Needs a head with keyed sliders."""
-        if not (polls.library(cls, "scipy") and polls.head(cls, context) and polls.object_mode(cls, context)):
+        """Needs a head with keyed or driven sliders."""
+        if not (polls.library(cls, "scipy") and polls.own_head(cls, context) and polls.object_mode(cls, context)):
             return False
         from ..headshop_addon.performance import is_keyed
 

@@ -19,7 +19,7 @@ class HEADSHOP_OT_dress_head(Simple, bpy.types.Operator):
     @classmethod
     def poll(cls, context):
         """Needs a head."""
-        return polls.head(cls, context) and polls.object_mode(cls, context)
+        return polls.own_head(cls, context) and polls.object_mode(cls, context)
 
     def act(self, context):
         """Dress, then light."""

@@ -17,7 +17,7 @@ class HEADSHOP_OT_key_sliders(Simple, bpy.types.Operator):
     @classmethod
     def poll(cls, context):
         """Needs a head that may be animated."""
-        return polls.head(cls, context)
+        return polls.own_head(cls, context)
 
     def act(self, context):
         """Insert the keys."""

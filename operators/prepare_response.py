@@ -28,7 +28,7 @@ class HEADSHOP_OT_prepare_response(Job, bpy.types.Operator):
     @classmethod
     def poll(cls, context):
         """Needs a head and the simulation."""
-        return polls.library(cls, "scipy") and polls.head(cls, context) and polls.object_mode(cls, context)
+        return polls.library(cls, "scipy") and polls.own_head(cls, context) and polls.object_mode(cls, context)
 
     def work(self, context):
         """Simulate, learn and keep it with the head."""

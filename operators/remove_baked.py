@@ -17,7 +17,7 @@ class HEADSHOP_OT_remove_baked(Simple, bpy.types.Operator):
     @classmethod
     def poll(cls, context):
         """Needs a head with something baked on it."""
-        if not (polls.library(cls, "scipy") and polls.head(cls, context) and polls.object_mode(cls, context)):
+        if not (polls.library(cls, "scipy") and polls.own_head(cls, context) and polls.object_mode(cls, context)):
             return False
         from ..headshop_addon.baking import is_baked
 

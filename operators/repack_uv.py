@@ -25,7 +25,7 @@ class HEADSHOP_OT_repack_uv(Simple, bpy.types.Operator):
     @classmethod
     def poll(cls, context):
         """Needs a head and xatlas."""
-        return polls.library(cls, "xatlas") and polls.head(cls, context) and polls.object_mode(cls, context)
+        return polls.library(cls, "xatlas") and polls.own_head(cls, context) and polls.object_mode(cls, context)
 
     def act(self, context):
         """Pack."""

@@ -17,7 +17,7 @@ class HEADSHOP_OT_reset_muscles(Simple, bpy.types.Operator):
     @classmethod
     def poll(cls, context):
         """Needs a head."""
-        return polls.head(cls, context)
+        return polls.own_head(cls, context)
 
     def act(self, context):
         """Zero every slider."""

@@ -23,7 +23,7 @@ class HEADSHOP_OT_set_expression(Simple, bpy.types.Operator):
     @classmethod
     def poll(cls, context):
         """Needs a head and the simulation."""
-        return polls.head(cls, context) and polls.library(cls, "scipy")
+        return polls.own_head(cls, context) and polls.library(cls, "scipy")
 
     def act(self, context):
         """Look the expression up and set the sliders."""

@@ -3,7 +3,7 @@
 
 import bpy
 
-from ..headshop_addon import active, heads, jobs, muscle_names, response
+from ..headshop_addon import active, heads, jobs, muscle_names, polls, response
 from .common import SidebarPanel, hint, progress
 
 
@@ -23,6 +23,9 @@ class HEADSHOP_PT_muscles(SidebarPanel, bpy.types.Panel):
             return
         if len(heads.find_heads(context.scene)) > 1:
             layout.label(text=heads.head_name(skin), icon="OUTLINER_OB_MESH")
+        why = f"{polls.LINKED}." if skin.library is not None else heads.lacking(skin)
+        if why:
+            hint(layout, context, why, "ERROR")
         layout.prop(skin.headshop, "live", text="Face Follows Sliders", toggle=True, icon="PLAY")
         row = layout.row(align=True)
         row.active = skin.headshop.live

@@ -113,6 +113,18 @@ def test_two_overrides_of_one_head_move_each_for_itself(addon, library, tmp_path
     assert moved(other, "eye_l") == 0 and moved(other, "mandible") > 5
 
 
+def test_a_linked_head_says_what_to_do(addon, library):
+    from headshop.headshop_addon import polls
+
+    with addon.data.libraries.load(library, link=True) as (_, wanted):
+        wanted.collections = ["Ref"]
+    addon.context.scene.collection.children.link(wanted.collections[0])
+    addon.context.view_layer.update()
+    for act in (addon.ops.headshop.key_sliders, addon.ops.headshop.reset_muscles, addon.ops.headshop.dress_head):
+        with pytest.raises(RuntimeError, match=polls.LINKED):
+            act()
+
+
 def test_a_linked_duplicate_moves_for_itself_and_keeps_its_baked_shapes(addon, whole):
     from headshop.headshop_addon import baking, bridge, heads, shape_keys
 
@@ -131,3 +143,14 @@ def test_a_linked_duplicate_moves_for_itself_and_keeps_its_baked_shapes(addon, w
     assert bridge.read_positions(whole, "joy").mean() - bridge.read_positions(whole).mean() == pytest.approx(
         1, abs=1e-3
     )
+
+
+def test_a_skin_duplicated_alone_leaves_the_head_it_came_from_alone(addon, whole):
+    from headshop.headshop_addon import heads
+
+    duplicate(addon, [whole])
+    copy = next(skin for skin in heads.find_heads() if skin != whole)
+    copy.headshop.controls.gaze_x = copy.headshop.controls.jaw_open = 1.0
+    assert moved(whole, "eye_l") == 0 and moved(whole, "mandible") == 0
+    assert "eye_l" in heads.lacking(copy) and "children" in heads.lacking(copy)
+    assert not heads.lacking(whole)
