@@ -140,6 +140,23 @@ def _on_frame(scene, depsgraph=None):
 
 
 @persistent
+def _on_update(scene, depsgraph):
+    """Sliders that drivers move follow what drives them at once; Blender calls no update of theirs."""
+    if _depth or jobs.running is not None:
+        return
+    for skin in heads.find_heads(scene):
+        if _is_driven(skin):
+            now = following.kept.get(skin.session_uid)
+            if now is None or now.pose != tuple(sliders(skin, depsgraph).values()):
+                follow(skin, depsgraph)
+
+
+def _is_driven(skin) -> bool:
+    data = skin.animation_data
+    return data is not None and any(curve.data_path.startswith("headshop.") for curve in data.drivers)
+
+
+@persistent
 def _on_history(*_):
     following.begin_anew()
     for skin in heads.find_heads(bpy.context.scene):
@@ -162,6 +179,7 @@ def _on_save(*_):
 
 _HANDLERS = (
     ("frame_change_post", _on_frame),
+    ("depsgraph_update_post", _on_update),
     ("undo_post", _on_history),
     ("redo_post", _on_history),
     ("load_post", _on_load),

@@ -154,3 +154,25 @@ def test_a_skin_duplicated_alone_leaves_the_head_it_came_from_alone(addon, whole
     assert moved(whole, "eye_l") == 0 and moved(whole, "mandible") == 0
     assert "eye_l" in heads.lacking(copy) and "children" in heads.lacking(copy)
     assert not heads.lacking(whole)
+
+
+def test_the_face_follows_a_driver_without_a_change_of_frame(addon, whole):
+    empty = _driven_by_an_empty(addon, whole)
+    empty.location.x = 0.5
+    addon.context.view_layer.update()
+    half = moved(whole, "mandible")
+    empty.location.x = 1.0
+    addon.context.view_layer.update()
+    assert 5 < half < moved(whole, "mandible")
+
+
+def _driven_by_an_empty(bpy, skin):
+    """An empty along whose X the jaw opens."""
+    empty = bpy.data.objects.new("Control", None)
+    bpy.context.scene.collection.objects.link(empty)
+    driver = skin.driver_add("headshop.controls.jaw_open").driver
+    driver.type = "SUM"
+    variable = driver.variables.new()
+    variable.type = "TRANSFORMS"
+    variable.targets[0].id, variable.targets[0].transform_type = empty, "LOC_X"
+    return empty
