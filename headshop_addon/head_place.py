@@ -18,16 +18,24 @@ PLACED = "headshop_placed"
 
 def read_motion(skin: bpy.types.Object, scene: bpy.types.Scene, frames) -> HeadMotion:
     """The motion of the head's object over ``frames`` of ``scene``, whatever moves it: keys, parents, constraints."""
-    now = scene.frame_current_final
     rotations, positions = [], []
-    with live.paused():
-        for frame in frames:
-            scene.frame_set(int(frame))
-            place = skin.evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world
-            rotations.append(np.array(place.to_quaternion().to_matrix()))
-            positions.append(np.array(place.translation) / bridge.METRES)
-        scene.frame_set(int(now), subframe=now % 1)
+    for shown in at_frames(skin, scene, frames):
+        place = shown.matrix_world
+        rotations.append(np.array(place.to_quaternion().to_matrix()))
+        positions.append(np.array(place.translation) / bridge.METRES)
     return HeadMotion(np.array(rotations), np.array(positions), frame_rate(scene))
+
+
+def at_frames(skin: bpy.types.Object, scene: bpy.types.Scene, frames):
+    """The evaluated object of a head at each of ``frames``, without the face following; the scene's frame is as before then."""
+    now = scene.frame_current_final
+    with live.paused():
+        try:
+            for frame in frames:
+                scene.frame_set(int(frame))
+                yield skin.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        finally:
+            scene.frame_set(int(now), subframe=now % 1)
 
 
 def frame_rate(scene: bpy.types.Scene) -> float:

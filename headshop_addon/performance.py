@@ -17,7 +17,7 @@ from ..sim.errors import InputError
 from ..sim.progress import Progress, Work
 from ..sim.tissue.posing import posed_parts
 from . import bridge, head_place, heads, shape_keys
-from .slotted_actions import animate_keys, curves_of, keyed_by_us, new_action, stop, value_path
+from .slotted_actions import animate_keys, curves_of, keyed_by_us, moved_otherwise, new_action, stop, value_path
 
 PERFORMANCE = "headshop_performance"
 #: mm that the principal shape keys may differ from the simulation, which itself settles to 0.01 mm: asking for more
@@ -29,27 +29,50 @@ _PATHS = {"headshop.muscles.": "muscles", "headshop.controls.": "controls"}
 
 
 def is_keyed(skin: bpy.types.Object) -> bool:
-    """Whether any muscle or control slider of the head has F-curves."""
-    return any(path.startswith(start) for path in curves_of(skin) for start in _PATHS)
+    """Whether any muscle or control slider of the head is moved by F-curves, NLA strips or drivers."""
+    return any(path.startswith(start) for path in {*curves_of(skin), *moved_otherwise(skin)} for start in _PATHS)
 
 
-def keyed_poses(skin: bpy.types.Object, frames) -> list[Pose]:
-    """The poses that the sliders' F-curves say at ``frames``; sliders without keys keep the value they have."""
-    curves = curves_of(skin)
-    values: dict[str, dict[str, np.ndarray]] = {}
-    for start, group in _PATHS.items():
-        still = getattr(getattr(skin, "headshop", None), group, None)
-        values[group] = {name: np.full(len(frames), value) for name, value in (still.values() if still else {}).items()}
-        for path, curve in curves.items():
-            if path.startswith(start):
-                values[group][path[len(start) :]] = np.array([curve.evaluate(frame) for frame in frames])
+def keyed_poses(skin: bpy.types.Object, frames, scene: bpy.types.Scene | None = None) -> list[Pose]:
+    """The poses that the sliders have at ``frames``; sliders that nothing moves keep the value they have.
+
+    Where only the action's own F-curves move them these are read; else ``scene`` is played, for NLA strips blend and drivers
+    depend on other objects.
+    """
+    rows = _played(skin, frames, scene or bpy.context.scene) if _is_played(skin) else _read(skin, frames)
     return [
         Pose(
-            muscles={name: float(v[k]) for name, v in values["muscles"].items() if v[k]},
-            **{name: float(v[k]) for name, v in values["controls"].items() if name in CONTROLS},
+            muscles={name: value for name, value in row["muscles"].items() if value},
+            **{name: value for name, value in row["controls"].items() if name in CONTROLS},
         )
-        for k in range(len(frames))
+        for row in rows
     ]
+
+
+def _is_played(skin) -> bool:
+    return any(path.startswith(start) for path in moved_otherwise(skin) for start in _PATHS)
+
+
+def _played(skin, frames, scene) -> list[dict[str, dict[str, float]]]:
+    return [
+        {group: getattr(shown.headshop, group).values() for group in _PATHS.values()}
+        for shown in head_place.at_frames(skin, scene, frames)
+    ]
+
+
+def _read(skin, frames) -> list[dict[str, dict[str, float]]]:
+    settings, curves = getattr(skin, "headshop", None), curves_of(skin)
+    rows = []
+    for frame in frames:
+        row = {}
+        for start, group in _PATHS.items():
+            still = getattr(settings, group, None)
+            row[group] = still.values() if still else {}
+            for path, curve in curves.items():
+                if path.startswith(start):
+                    row[group][path[len(start) :]] = float(curve.evaluate(frame))
+        rows.append(row)
+    return rows
 
 
 def bake_performance(

@@ -77,6 +77,20 @@ def curves_of(owner: bpy.types.ID) -> dict[str, bpy.types.FCurve]:
     return {curve.data_path: curve for bag in bags if bag is not None for curve in bag.fcurves if not curve.mute}
 
 
+def moved_otherwise(owner: bpy.types.ID) -> set[str]:
+    """Data paths that NLA strips or drivers move, tracks and drivers that are muted left out."""
+    data = owner.animation_data
+    if data is None:
+        return set()
+    found = {curve.data_path for curve in data.drivers if not curve.mute}
+    for track in data.nla_tracks if data.use_nla else ():
+        for strip in () if track.mute else track.strips:
+            if strip.action is not None and strip.action_slot is not None and not strip.mute:
+                bags = [s.channelbag(strip.action_slot) for layer in strip.action.layers for s in layer.strips]
+                found |= {curve.data_path for bag in bags if bag is not None for curve in bag.fcurves if not curve.mute}
+    return found
+
+
 def keyed_by_us(owner: bpy.types.ID) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Data path -> frames (f,) and values (f,) of the keys that `animate` gave a datablock."""
     data = owner.animation_data

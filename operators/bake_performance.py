@@ -39,7 +39,7 @@ class HEADSHOP_OT_bake_performance(Job, bpy.types.Operator):
 
         scene, skin = context.scene, active.skin(context)
         frames = range(scene.frame_start, scene.frame_end + 1)
-        poses = keyed_poses(skin, frames)
+        poses = keyed_poses(skin, frames, scene)
         moving = {}
         if self.dynamics:
             from ..headshop_addon.head_place import felt_in, frame_rate

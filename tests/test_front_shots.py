@@ -166,6 +166,31 @@ def test_the_face_follows_a_driver_without_a_change_of_frame(addon, whole):
     assert 5 < half < moved(whole, "mandible")
 
 
+def test_a_driver_and_nla_strips_are_baked_as_they_play(addon, whole):
+    from headshop.headshop_addon import performance
+
+    scene = addon.context.scene
+    empty = _driven_by_an_empty(addon, whole)
+    for frame, value in ((1, 0.0), (11, 1.0)):
+        empty.location.x = value
+        empty.keyframe_insert("location", frame=frame)
+        whole.headshop.muscles.corrugator_l = value
+        whole.keyframe_insert("headshop.muscles.corrugator_l", frame=frame)
+    data = whole.animation_data
+    strip = data.nla_tracks.new().strips.new("frown", 11, data.action)
+    data.action = None
+    scene.frame_set(4)
+    assert performance.is_keyed(whole)
+    poses = performance.keyed_poses(whole, [1, 6, 11, 21], scene)
+    assert [pose.jaw_open for pose in poses] == pytest.approx([0, 0.5, 1, 1], abs=1e-5)
+    assert [pose.muscles.get("corrugator_l", 0.0) for pose in poses] == pytest.approx([0, 0, 0, 1], abs=1e-5)
+    assert scene.frame_current == 4
+    whole.driver_remove("headshop.controls.jaw_open")
+    assert performance.is_keyed(whole)
+    strip.mute = True
+    assert not performance.is_keyed(whole)
+
+
 def _driven_by_an_empty(bpy, skin):
     """An empty along whose X the jaw opens."""
     empty = bpy.data.objects.new("Control", None)
