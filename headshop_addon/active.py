@@ -35,6 +35,20 @@ def skin(context) -> bpy.types.Object | None:
     return next(iter(heads.find_heads(context.scene)), None)
 
 
+def linked(context) -> bpy.types.Object | None:
+    """What has to be overridden before a linked head can act here: an instance of its collection, or its skin, linked or
+    overridden without being editable, as Blender's own command leaves it."""
+    instance = getattr(context, "active_object", None)
+    collection = instance.instance_collection if instance is not None and instance.type == "EMPTY" else None
+    if collection is not None and collection.library is not None and any(map(heads.is_skin, collection.all_objects)):
+        return instance
+    there = skin(context)
+    if there is None:
+        return None
+    override = there.override_library
+    return there if there.library is not None or (override is not None and override.is_system_override) else None
+
+
 def muscles_collection(skin: bpy.types.Object) -> bpy.types.Collection | None:
     """The collection that holds a head's muscles, to show or hide them; None where the artist dissolved it."""
     collection = heads.head_collection(skin)

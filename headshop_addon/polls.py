@@ -4,7 +4,7 @@
 from . import active, dependencies
 
 #: Why a head that was linked does not move, and what to do.
-LINKED = "This head is linked from another file: make a library override of its collection first"
+LINKED = "This head is linked from another file: press Override Head in the panel Muscles first"
 
 
 def library(cls, name: str) -> bool:

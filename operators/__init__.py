@@ -9,7 +9,7 @@ FILES = (
     *("import_scan", "make_sample", "choose_scan"),
     *("find_landmarks", "load_landmarks", "save_landmarks", "click_landmarks", "clear_landmarks"),
     *("build_head", "dress_head", "repack_uv"),
-    *("reset_muscles", "set_expression", "key_sliders", "prepare_response"),
+    *("override_head", "reset_muscles", "set_expression", "key_sliders", "prepare_response"),
     *("bake_expressions", "bake_muscles", "bake_rig", "bake_performance", "remove_baked"),
     *("export_head", "render_sheet"),
 )

@@ -3,7 +3,7 @@
 
 import bpy
 
-from ..headshop_addon import active, heads, jobs, muscle_names, polls, response
+from ..headshop_addon import active, heads, jobs, muscle_names, response
 from .common import SidebarPanel, hint, progress
 
 
@@ -18,13 +18,16 @@ class HEADSHOP_PT_muscles(SidebarPanel, bpy.types.Panel):
         if progress(layout, "muscles"):
             return
         skin = active.skin(context)
-        if skin is None:
+        if active.linked(context) is not None:
+            hint(layout, context, "A linked head acts in this file once it is overridden.", "LINKED")
+            layout.operator("headshop.override_head", icon="LIBRARY_DATA_OVERRIDE")
+        elif skin is None:
             hint(layout, context, "Muscles belong to a head: build one first.")
+        if skin is None:
             return
         if len(heads.find_heads(context.scene)) > 1:
             layout.label(text=heads.head_name(skin), icon="OUTLINER_OB_MESH")
-        why = f"{polls.LINKED}." if skin.library is not None else heads.lacking(skin)
-        if why:
+        if why := heads.lacking(skin):
             hint(layout, context, why, "ERROR")
         layout.prop(skin.headshop, "live", text="Face Follows Sliders", toggle=True, icon="PLAY")
         row = layout.row(align=True)

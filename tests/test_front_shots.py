@@ -201,3 +201,32 @@ def _driven_by_an_empty(bpy, skin):
     variable.type = "TRANSFORMS"
     variable.targets[0].id, variable.targets[0].transform_type = empty, "LOC_X"
     return empty
+
+
+@pytest.mark.parametrize("how", ["instance", "collection", "blender's override"])
+def test_a_linked_head_is_overridden_by_one_button(addon, library, how):
+    from headshop.headshop_addon import active, heads
+
+    scene, layer = addon.context.scene, addon.context.view_layer
+    with addon.data.libraries.load(library, link=True) as (_, wanted):
+        wanted.collections = ["Ref"]
+    if how == "collection":
+        scene.collection.children.link(wanted.collections[0])
+    elif how == "instance":
+        empty = addon.data.objects.new("Ref", None)
+        empty.instance_type, empty.instance_collection = "COLLECTION", wanted.collections[0]
+        scene.collection.objects.link(empty)
+        layer.objects.active = empty
+        empty.select_set(True)
+    else:
+        wanted.collections[0].override_hierarchy_create(scene, layer)
+    layer.update()
+    assert active.linked(addon.context)
+    addon.ops.headshop.override_head()
+    (skin,) = heads.find_heads(scene)
+    assert skin.library is None and not skin.override_library.is_system_override
+    assert active.skin(addon.context) == skin and active.linked(addon.context) is None
+    assert not addon.ops.headshop.override_head.poll()
+    skin.headshop.model = "DIRECT"
+    addon.ops.headshop.set_expression(expression="joy")
+    assert moved(skin) > 3 and moved(skin, "mandible") > 1
