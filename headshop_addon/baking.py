@@ -97,7 +97,7 @@ def bake_acted(
 def is_baked(skin: bpy.types.Object) -> bool:
     """Whether shapes, a rig or a performance were baked onto the head."""
     return bool(shape_keys.baked_names(skin)) or any(
-        performance.PERFORMANCE in obj for obj in heads.parts_of(skin).values()
+        heads.note(obj, performance.PERFORMANCE) is not None for obj in heads.parts_of(skin).values()
     )
 
 
@@ -110,7 +110,7 @@ def remove_baked(skin: bpy.types.Object) -> None:
     """
     shape_keys.require_editable(skin)
     heads.own_meshes(skin)
-    moved = rig_keys.is_rigged(skin) or performance.PERFORMANCE in skin
+    moved = rig_keys.is_rigged(skin) or heads.note(skin, performance.PERFORMANCE) is not None
     rig_keys.remove_rig(skin)
     performance.remove_performance(skin)
     for obj in heads.parts_of(skin).values():

@@ -136,7 +136,12 @@ def _current(skin, moving: bool) -> Following | None:
 
 
 def _write(skin, obj, delta):
-    """Set the part's ``Live`` key to its rest shape plus ``delta`` (n, 3) mm, given in the skin's space."""
+    """Set the part's ``Live`` key to its rest shape plus ``delta`` (n, 3) mm, given in the skin's space.
+
+    A part that stayed linked, where the skin alone was overridden, stays as it is.
+    """
+    if obj.data.library is not None:
+        return
     if obj != skin and KEY not in (obj.data.shape_keys.key_blocks if obj.data.shape_keys else ()):
         if np.abs(delta).max(initial=0.0) < STILL:
             return

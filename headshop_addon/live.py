@@ -98,8 +98,8 @@ def _let_override(skin) -> None:
     would be 0 when the shot is opened. Reading a group makes it.
     """
     linked = skin.override_library.reference if skin.override_library else None
-    if heads.is_skin(linked):
-        _ = linked.headshop.muscles, linked.headshop.controls
+    for each in (skin, linked) if heads.is_skin(linked) else ():
+        _ = each.headshop.muscles, each.headshop.controls
 
 
 def _settle():
@@ -166,9 +166,6 @@ def _on_history(*_):
 @persistent
 def _on_load(*_):
     following.kept.clear()
-    for skin in heads.find_heads(bpy.context.scene):
-        if skin.data.library and not skin.library:  # an override: the pose is on a mesh that this file does not keep
-            follow(skin, bpy.context.evaluated_depsgraph_get())
 
 
 @persistent

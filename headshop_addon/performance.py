@@ -159,7 +159,7 @@ def write_performance(skin, found: dict, frames: np.ndarray, name: str) -> None:
             block.slider_min, block.slider_max = -1.0, 1.0
             bridge.write_positions(obj, basis + shape @ turn, block.name)
             weights[block.name] = found[part].weights[:, number]
-        obj[PERFORMANCE] = json.dumps(list(weights))
+        heads.keep_note(obj, PERFORMANCE, json.dumps(list(weights)))
         animate_keys(action, obj.data.shape_keys, frames, weights)
     if not len(action.slots):
         bpy.data.actions.remove(action)  # nothing moves
@@ -170,7 +170,7 @@ def write_performance(skin, found: dict, frames: np.ndarray, name: str) -> None:
 
 def baked_weights(skin: bpy.types.Object) -> tuple[list[str], np.ndarray, np.ndarray] | None:
     """The skin's shape keys of a baked performance, its frames (f,) and their weights (f, k); None if there is none."""
-    names = json.loads(skin.get(PERFORMANCE, "[]"))
+    names = json.loads(heads.note(skin, PERFORMANCE, "[]"))
     curves = {} if skin.data.shape_keys is None else keyed_by_us(skin.data.shape_keys)
     keyed = {name: curves.get(value_path(name)) for name in names}
     names = [name for name, curve in keyed.items() if curve is not None]
@@ -190,9 +190,9 @@ def remove_performance(skin: bpy.types.Object) -> None:
     """Take a baked performance off a head."""
     head_place.remove_motion(skin)
     for obj in heads.parts_of(skin).values():
-        names = json.loads(obj.get(PERFORMANCE, "[]"))
+        names = json.loads(heads.note(obj, PERFORMANCE, "[]"))
         if obj.data.shape_keys is not None:
             stop(obj.data.shape_keys)
         shape_keys.remove_keys(obj, names)
-        if PERFORMANCE in obj:
-            del obj[PERFORMANCE]
+        if heads.note(obj, PERFORMANCE) is not None:
+            heads.drop_note(obj, PERFORMANCE)

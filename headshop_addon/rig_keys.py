@@ -73,12 +73,12 @@ def write_rig(skin: bpy.types.Object, keys: Keys) -> None:
             block.slider_min, block.slider_max, block.lock_shape = -RANGE, RANGE, True
         peaks = {name: {"peak_mm": _peak(shape)} for name, shape in each.plain.items()}
         peaks |= {name: {"peak_mm": _peak(shape), "driven": True} for name, (_, shape) in each.driven.items()}
-        obj[shape_keys.SHAPES] = json.dumps(shape_keys.baked_report(obj) | peaks)
+        heads.keep_note(obj, shape_keys.SHAPES, json.dumps(shape_keys.baked_report(obj) | peaks))
     sources = skin.data.shape_keys
     for name, formula in keys.quantities.items():
         sources[name] = 0.0
         _drive(sources.driver_add(f'["{name}"]').driver, sources, formula, keys)
-    skin[QUANTITIES] = json.dumps(list(keys.quantities))
+    heads.keep_note(skin, QUANTITIES, json.dumps(list(keys.quantities)))
     for part, each in keys.parts.items():
         blocks = parts[part].data.shape_keys.key_blocks
         for name in each.plain if part != "skin" else ():
@@ -117,7 +117,7 @@ def _drive(driver: bpy.types.Driver, sources: bpy.types.Key, formula, keys: Keys
 
 def is_rigged(skin: bpy.types.Object) -> bool:
     """Whether a rig was baked onto the head."""
-    return QUANTITIES in skin
+    return heads.note(skin, QUANTITIES) is not None
 
 
 def remove_rig(skin: bpy.types.Object) -> None:
@@ -127,8 +127,8 @@ def remove_rig(skin: bpy.types.Object) -> None:
     for obj in heads.parts_of(skin).values():
         shape_keys.remove_keys(obj, shape_keys.driven_names(obj))
     keys = skin.data.shape_keys
-    for name in json.loads(skin[QUANTITIES]):
+    for name in json.loads(heads.note(skin, QUANTITIES)):
         if keys is not None and name in keys:
             keys.driver_remove(f'["{name}"]')
             del keys[name]
-    del skin[QUANTITIES]
+    heads.drop_note(skin, QUANTITIES)

@@ -101,14 +101,11 @@ def as_scanned(skin: bpy.types.Object) -> np.ndarray | None:
 
 
 def require_editable(skin: bpy.types.Object) -> None:
-    """Raise `InputError` if the head is linked: its meshes cannot take shape keys."""
-    linked = [obj.name for obj in heads.parts_of(skin).values() if obj.data.library is not None]
+    """Raise `InputError` if the head is linked: its meshes cannot take shape keys, those of an override can (`own_meshes`)."""
+    linked = [obj.name for obj in heads.parts_of(skin).values() if obj.library is not None]
     if linked:
         name = heads.head_name(skin)
-        raise InputError(
-            f"The meshes of {name!r} are linked from another file: make them local (Object, Relations, Make Local, Selected "
-            "Objects and Data), or bake in that file."
-        )
+        raise InputError(f"{name!r} is linked from another file: press Override Head first, or bake in that file.")
 
 
 def baked_names(obj: bpy.types.Object) -> list[str]:
@@ -130,7 +127,7 @@ def _there(obj: bpy.types.Object) -> dict[str, dict]:
 def baked_report(obj: bpy.types.Object) -> dict[str, dict]:
     """Name of each baked shape -> its report."""
     try:
-        return json.loads(obj.get(SHAPES, "{}"))
+        return json.loads(heads.note(obj, SHAPES, "{}"))
     except (ValueError, TypeError):
         return {}
 
@@ -167,7 +164,7 @@ def write_shapes(skin: bpy.types.Object, shapes: dict[str, dict[str, np.ndarray]
                 follow(block, skin.data.shape_keys, name)
         kept = {name: value for name, value in ours.items() if name not in shapes}
         if moving or ours:
-            obj[SHAPES] = json.dumps(kept | {name: report.get(name, {}) for name in moving})
+            heads.keep_note(obj, SHAPES, json.dumps(kept | {name: report.get(name, {}) for name in moving}))
 
 
 def remove_keys(obj: bpy.types.Object, names) -> None:
@@ -179,8 +176,8 @@ def remove_keys(obj: bpy.types.Object, names) -> None:
         block.driver_remove("value")
         obj.shape_key_remove(block)
     ours = {name: value for name, value in baked_report(obj).items() if name not in names}
-    if SHAPES in obj:
-        obj[SHAPES] = json.dumps(ours)
+    if heads.note(obj, SHAPES) is not None:
+        heads.keep_note(obj, SHAPES, json.dumps(ours))
     if there and len(keys.key_blocks) == 1:
         obj.shape_key_remove(keys.key_blocks[0])
 

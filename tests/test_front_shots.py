@@ -230,3 +230,39 @@ def test_a_linked_head_is_overridden_by_one_button(addon, library, how):
     skin.headshop.model = "DIRECT"
     addon.ops.headshop.set_expression(expression="joy")
     assert moved(skin) > 3 and moved(skin, "mandible") > 1
+
+
+def test_undo_after_a_slider_of_an_override_leaves_what_was_linked(addon, library):
+    """Blender crashed: the linked mesh had been given a shape key, which undo took away from under it."""
+    from headshop.headshop_addon import heads
+
+    skin = overridden(addon, library)
+    addon.ops.ed.undo_push(message="linked")
+    skin.headshop.controls.jaw_open = 1.0
+    addon.context.view_layer.update()
+    assert all(obj.data.library is None for obj in heads.parts_of(skin).values())
+    addon.ops.ed.undo_push(message="open")
+    addon.ops.ed.undo()
+    (skin,) = heads.find_heads()
+    addon.context.view_layer.update()
+    assert skin.headshop.controls.jaw_open == moved(skin) == 0
+    addon.ops.ed.redo()
+    (skin,) = heads.find_heads()
+    assert moved(skin, "mandible") > 5
+
+
+def test_what_is_baked_on_an_override_is_known_when_the_shot_is_opened(addon, library, tmp_path):
+    from headshop.headshop_addon import baking, heads, performance, shape_keys
+    from headshop.sim.acting.principal import principal_shapes
+
+    skin = overridden(addon, library)
+    motion = np.ones((2, len(skin.data.vertices), 3)) * np.array([0.0, 1.0])[:, None, None]
+    performance.write_performance(skin, {"skin": principal_shapes(motion, 0.001)}, np.arange(1, 3), "Performance")
+    shape_keys.write_shapes(skin, {"joy": {"skin": motion[1]}}, {"joy": {"peak_mm": 1.0}})
+    reopened(addon, tmp_path)
+    (skin,) = heads.find_heads()
+    assert shape_keys.baked_names(skin) == ["joy"] and performance.baked_weights(skin) is not None
+    baking.remove_baked(skin)
+    assert skin.data.shape_keys is None and not baking.is_baked(skin)
+    reopened(addon, tmp_path)
+    assert not baking.is_baked(heads.find_heads()[0])
