@@ -23,11 +23,8 @@ if TYPE_CHECKING:
     from .laid_head import LaidHead
 
 #: mm, all on a head of the reference's size.
-BELOW, BEHIND, NAPE = (
-    -4.0,
-    15.0,
-    18.0,
-)  # that clothes stay below the chin; that far behind the ears they rise to so far above
+BELOW = -4.0  # above the chin, to which clothes rise
+BEHIND, NAPE = 15.0, 18.0  # that far behind the ears they rise to so far above it
 ON_SKIN = 4.0  # to which the scan shows the face's skin
 AROUND = 2.5  # over which colours are averaged
 EDGE = 6.0  # beside clothes: their edges, and their shade on the skin
