@@ -155,7 +155,7 @@ def export(options) -> None:
 
         names = export_head(skin, copy)
     if not options.quiet:
-        print(f"{options.output}: {len(names)} shapes")
+        print(f"{options.output}: {len(names)} shape{'s' * (len(names) != 1)}")
 
 
 def sample(options) -> None:

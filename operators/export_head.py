@@ -38,7 +38,14 @@ class HEADSHOP_OT_export_head(Simple, ExportHelper, bpy.types.Operator):
 
     def act(self, context):
         """Export."""
+        from ..headshop_addon.baking import is_baked
         from ..headshop_addon.export import export_head
+        from ..headshop_addon.performance import is_keyed
 
-        names = export_head(active.skin(context), self.filepath)
-        return f"{self.filepath}: {len(names)} shapes"
+        skin = active.skin(context)
+        names = export_head(skin, self.filepath)
+        if is_keyed(skin) and not is_baked(skin):
+            why = "sliders are not written: bake Keyed Sliders to Animation first"
+            self.report({"WARNING"}, f"{self.filepath}: a head that does not move, for {why}")
+            return None
+        return f"{self.filepath}: {len(names)} shape{'s' * (len(names) != 1)}"

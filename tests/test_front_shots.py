@@ -266,3 +266,14 @@ def test_what_is_baked_on_an_override_is_known_when_the_shot_is_opened(addon, li
     assert skin.data.shape_keys is None and not baking.is_baked(skin)
     reopened(addon, tmp_path)
     assert not baking.is_baked(heads.find_heads()[0])
+
+
+def test_an_export_says_that_keyed_sliders_are_not_in_it(addon, whole, tmp_path, capfd):
+    """It wrote a statue and said 0 shapes."""
+    path = str(tmp_path / "ref.glb")
+    addon.ops.headshop.export_head(filepath=path)
+    assert "0 shapes" in capfd.readouterr().out
+    addon.ops.headshop.key_sliders()
+    addon.ops.headshop.export_head(filepath=path)
+    said = capfd.readouterr().out
+    assert "bake Keyed Sliders to Animation first" in said and "shape" not in said

@@ -85,6 +85,21 @@ def test_skin_is_no_clothing(reference, seen_skin, dressed):
     face = reference.landmark_positions()["sn"]
     unlike = replace(scan, colour=np.where((np.linalg.norm(points - face, axis=1) < 90)[:, None], scan.colour, 1.0))
     assert not dressed(SKIN, none, unlike)[0].any()  # a face without a neck
+    on_nose = np.linalg.norm(points - reference.landmark_positions()["prn"], axis=1) < 10
+    colour = np.where(on_nose[:, None], CLOTHS["navy"], np.where(points[:, 2:] < face[2] - 60, SKIN, 1.0))
+    assert 3 < on_nose.sum() < 50
+    assert not dressed(SKIN, none, replace(scan, colour=colour))[0].any()  # too little of the face
+
+
+def test_a_painted_face_is_no_clothing(reference, seen_skin, dressed):
+    """Below the nose all is blue: what of that is chin and cheeks stays."""
+    target, marks = seen_skin()
+    out = dressed(CLOTHS["navy"], target.vertices[:, 2] < marks["sn"][2])[0]
+    top = target.vertices[target.triangles][:, :, 2].max(axis=1)
+    assert (
+        out.any()
+        and top[out & (target.vertices[target.triangles][:, :, 1].min(axis=1) < 0)].max() < marks["gn"][2] + 16
+    )
 
 
 @pytest.mark.parametrize("closed", [True, False])
@@ -93,17 +108,22 @@ def test_scans_may_be_closed_below_or_end_higher_behind(reference, seen_skin, la
     points, triangles = target.vertices, target.triangles
     shirt = _shirt(reference, points)
     if closed:
-        rim = target._open[(points[target._open][:, :, 2] < marks["gn"][2] - 60).all(axis=1)]
+        rim = target._open[shirt[target._open].all(axis=1)]
         points = np.concatenate([points, [points[rim].mean(axis=(0, 1))]])
         cap = np.column_stack([rim[:, ::-1], np.full(len(rim), len(points) - 1)])
         triangles, shirt = np.concatenate([triangles, cap]), np.append(shirt, True)
     else:
-        lowest = marks["gn"][2] - 85 + 0.5 * (points[:, 1] - marks["gn"][1])
-        triangles, shirt = triangles[(points[:, 2] > lowest)[triangles].all(axis=1)], shirt & (points[:, 1] > 0)
+        lowest = marks["gn"][2] - 100 + 0.6 * (points[:, 1] - marks["gn"][1])
+        triangles, shirt = triangles[(points[:, 2] > lowest)[triangles].all(axis=1)], shirt & (points[:, 1] > 30)
     scan = Mesh.from_triangles(points, triangles, colour=np.where(shirt[:, None], CLOTHS["navy"], SKIN))
     cut = Surface(points, triangles, 2.0)
     out = clothing_over(space, laid(space, reference.skin.vertices[space.vertices]), cut, scan)
     cloth = shirt[cKDTree(points).query(cut.vertices)[1]][cut.triangles].all(axis=1)
+    low = cut.vertices[cut.triangles[cloth]][:, :, 2].min() - cut.vertices[:, 2].min()
+    if closed:
+        assert low < 1 and not cut.border_vertex[np.unique(cut.triangles[cloth])].any()
+    else:
+        assert low > 21
     assert cloth.sum() > 30 and out[cloth].all() and not out.all()
 
 

@@ -54,7 +54,7 @@ def clothing_over(space: ShapeSpace, fit: ShapeFit, target: Surface, scan: Mesh 
     if skin is None or not len(low):
         return none
     some = np.zeros(len(target.vertices), dtype=bool)
-    some[low] = seen[low] & skin(light[low])
+    some[low] = skin(light[low])
     piece, area = pieces(target, some)
     reaching = np.zeros(len(area), dtype=bool)
     height = target.vertices @ fit.pose.turn[:, 2]
