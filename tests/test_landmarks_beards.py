@@ -12,12 +12,14 @@ from headshop.sim.anatomy.landmark_names import SKIN
 from headshop.sim.landmarks import filled_in, find, laid_head, looks, placed_face
 from headshop.sim.landmarks.beards import (
     HANGING,
+    ROUGH,
     UNDER_CHIN,
     above_beard,
     beard_over,
     grows_beard,
     heights,
     lips_beside,
+    rough_chin,
     thick_beard,
 )
 from headshop.sim.landmarks.find import find_landmarks
@@ -174,6 +176,18 @@ def test_whoever_wants_to_keep_it_does(reference, bearded):
 def test_a_bare_chin_is_no_beard(reference, bearded):
     target, _, marks, _ = bearded(3, 0, 0)
     assert finish(first_look(reference, target, marks)).left_out["beard"] == 0.0
+
+
+@pytest.mark.parametrize("worn, noise, told", [((3, 0, 0), 0.6, False), (WORN, 0.0, True), (WORN, 0.2, True)])
+def test_a_scan_that_is_rough_all_over_tells_nothing_of_a_beard(space, bearded, laid, worn, noise, told):
+    """As the frames of depth cameras are, whose noise is as rough on chins as beards."""
+    target, points, _, _ = bearded(*worn)
+    strewn = noise * np.random.default_rng(1).standard_normal(target.vertices.shape)
+    noisy = Surface(target.vertices + strewn, target.triangles, smooth=2.0)
+    fit = laid(space, points)
+    chin = grows_beard(space) & (space.face > 0.5)
+    assert np.median(heights(space, fit, noisy)[1][chin]) > ROUGH  # by itself it is rough enough
+    assert rough_chin(space, fit, noisy)[0] == told
 
 
 def test_relief_that_a_beard_hides_says_nothing_of_a_face_above_it(reference, space, bearded, laid):
