@@ -200,3 +200,16 @@ def test_thinning_keeps_the_first_of_close_points():
     many = np.random.default_rng(0).uniform(0, 50, (2000, 3))
     pick = scattered(many, 10.0)
     assert 100 < len(pick) <= 216 and len(np.unique(np.floor(many[pick] / 10), axis=0)) == len(pick)
+
+
+@pytest.mark.parametrize("thick", [3.0, 8.0])
+@pytest.mark.parametrize("depth", [0.2, 0.8])
+def test_the_outer_wall_of_a_shell_tells_which_side_is_out(thick, depth):
+    """Of a hollow print, wound either way, also to a skin that lies nearer to the inner wall."""
+    outer, triangles = ball()
+    inner, skin = outer * (1 - thick / 100), outer * (1 - depth * thick / 100)
+    walls = np.concatenate([triangles, triangles[:, ::-1] + len(outer)])
+    shell = Surface(np.concatenate([outer, inner]), walls)
+    assert not shell.inside_out(skin, outer / 100, 15.0) and shell.turned().inside_out(skin, outer / 100, 15.0)
+    single = Surface(outer, triangles)
+    assert not single.inside_out(skin, outer / 100, 15.0) and single.turned().inside_out(skin, outer / 100, 15.0)

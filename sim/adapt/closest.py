@@ -25,6 +25,9 @@ FIRST = 8  # nearest samples of a point that are looked at before it is known ho
 BATCH = 20_000  # points looked at together
 FEW = 10_000  # sides that tell how long they are in the median
 SAME = 1e-3  # mm: vertices as near as that are one
+#: Steps outward in which the outer wall of a shell is looked for; cosine from which on that faces apart from the inner one, and
+#: the share of a skin before which it does.
+LAYERS, ALIKE, MOST = 6, 0.5, 0.5
 ENOUGH = 300_000  # triangles that show all of a head that a mesh of some thousand vertices can follow
 
 
@@ -293,10 +296,22 @@ class Surface:
 
     def inside_out(self, points, normals, reach: float) -> bool:
         """Whether most of what is within ``reach`` mm of ``points`` (k, 3) of a skin faces the other way than their
-        ``normals`` (k, 3): scans may be wound either way."""
+        ``normals`` (k, 3): scans may be wound either way.
+
+        Where there are two layers that face apart, the one farther out has it: those are the walls of a shell, a hollow print
+        for one. Laid on a scan turned as its inner wall has it, a skin would lie on that, which is as much a face.
+        """
         facing = self.facing(points, reach)
-        agree = np.einsum("ij,ij->i", facing, normals)[facing.any(axis=1)]
-        return len(agree) > 0 and bool(np.median(agree) < 0)
+        near = facing.any(axis=1)
+        if not near.any():
+            return False
+        points, normals = points[near], normals[near]
+        side = 1.0 if np.median(np.einsum("ij,ij->i", facing[near], normals)) >= 0 else -1.0
+        outer, step = np.zeros(len(points), dtype=bool), reach / LAYERS
+        for far in step * np.arange(1, LAYERS + 1):
+            before = self.facing(points + far * normals, step)
+            outer |= side * np.einsum("ij,ij->i", before, normals) < -ALIKE
+        return bool((side < 0) != (outer.mean() > MOST))
 
     def ranked(
         self, points, normals, reach: float, agreement: float = 0.5, near: int = 24, bend: float = 1.0
