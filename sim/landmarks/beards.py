@@ -33,8 +33,8 @@ OVER_SKIN = 60.0  # mm behind a beard to which skin is hidden by it
 #: Share of the chin that is rough where a beard may be: of those, .71 and more; of smooth scans of 16 faces .24 at most, of
 #: noisy ones as much as of beards. And that so rough as only thick beards and very noisy scans are.
 MOSTLY_ROUGH, SHAGGY = 0.5, (0.25, 0.8)
-#: Per cent of the face between brows and nose that are calmer than what a beard is told from. Brows, lids and the nose are never
-#: smooth: of two clean scans .15 and .18 rad, of two frames of depth cameras .50, whose chins had .45 in the middle.
+#: Per cent of the face between brows and nose that are calmer than what a beard is told from. Brows, lids and the nose are
+#: never smooth: of two clean scans .15 and .18 rad, of two frames of depth cameras .50, whose chins had .45 in the middle.
 CALM = 10
 CHIN = 8.0  # mm below gnathion to which the chin tells that
 IN_FACE = 0.3  # of `ShapeSpace.face`
