@@ -91,7 +91,9 @@ def rough_chin(space: ShapeSpace, fit: ShapeFit, target: Surface) -> tuple[bool,
     rough = heights(space, fit, target, grows_beard(space) | bare)[1]
     seen = rough[bare & (rough > 0)]
     usual = np.percentile(seen, CALM) if len(seen) else 0.0
-    share = [space.area[chin & (rough > max(least, usual))].sum() / space.area[chin].sum() for least in (ROUGH, SHAGGY[0])]
+    share = [
+        space.area[chin & (rough > max(least, usual))].sum() / space.area[chin].sum() for least in (ROUGH, SHAGGY[0])
+    ]
     return share[0] > MOSTLY_ROUGH, share[1] > SHAGGY[1]
 
 
