@@ -103,8 +103,8 @@ def test_a_painted_face_is_no_clothing(reference, seen_skin, dressed):
 
 
 @pytest.mark.parametrize("closed", [True, False])
-def test_scans_may_be_closed_below_or_end_higher_behind(reference, seen_skin, laid, closed):
-    space, (target, marks) = shape_space(reference), seen_skin()
+def test_scans_may_be_closed_below_or_go_on_below_what_is_worn(reference, seen_skin, laid, closed):
+    space, (target, _) = shape_space(reference), seen_skin()
     points, triangles = target.vertices, target.triangles
     shirt = _shirt(reference, points)
     if closed:
@@ -112,9 +112,10 @@ def test_scans_may_be_closed_below_or_end_higher_behind(reference, seen_skin, la
         points = np.concatenate([points, [points[rim].mean(axis=(0, 1))]])
         cap = np.column_stack([rim[:, ::-1], np.full(len(rim), len(points) - 1)])
         triangles, shirt = np.concatenate([triangles, cap]), np.append(shirt, True)
-    else:
-        lowest = marks["gn"][2] - 100 + 0.6 * (points[:, 1] - marks["gn"][1])
-        triangles, shirt = triangles[(points[:, 2] > lowest)[triangles].all(axis=1)], shirt & (points[:, 1] > 30)
+    else:  # as where a chest is bare
+        lower = points[np.argmin(points[:, 2])] - [[0, 0, 40], [9, 0, 40], [0, 9, 40]]
+        points, shirt = np.concatenate([points, lower]), np.append(shirt, [False] * 3)
+        triangles = np.concatenate([triangles, [len(points) - np.array([3, 2, 1])]])
     scan = Mesh.from_triangles(points, triangles, colour=np.where(shirt[:, None], CLOTHS["navy"], SKIN))
     cut = Surface(points, triangles, 2.0)
     out = clothing_over(space, laid(space, reference.skin.vertices[space.vertices]), cut, scan)
