@@ -74,6 +74,8 @@ def landmarks(options) -> None:
         write_landmarks(file, back, found.missing, found.confidence, found.mid_air)
     if not options.quiet:
         print(f"{options.output}: {found.summary()}")
+        if found.doubt:
+            print(found.doubt)
         _say_if_unsure(scan.report)
 
 

@@ -194,7 +194,11 @@ def build_alone(path, name: str, unit: str | None = None, up: str | None = None,
     """
     scan, found = yield from portion(load_scan_alone(path, unit, up), 0.0, 0.35)
     sure = found.sure()
-    return (yield from portion(build(scan, sure, name, found=sure, **options), 0.35, 1.0))
+    skin, report = yield from portion(build(scan, sure, name, found=sure, **options), 0.35, 1.0)
+    if found.doubt:
+        report["fit"]["advice"] = " ".join(filter(None, (found.doubt, report["fit"]["advice"])))
+        heads.write_report(skin, report)
+    return skin, report
 
 
 @contextmanager

@@ -45,4 +45,4 @@ class HEADSHOP_OT_find_landmarks(Job, bpy.types.Operator):
             said += "; the scan was turned upright by them"
         scan_landmarks.take_found(self._scan, placed)
         context.scene.headshop.show_landmarks = True
-        return f"{self._scan.name}: {said}"
+        return ". ".join(filter(None, (f"{self._scan.name}: {said}", result.doubt)))

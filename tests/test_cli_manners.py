@@ -14,7 +14,7 @@ from headshop.headshop_addon.command_line import main, parser
 from headshop.headshop_addon.progress_bar import progress_bar
 from headshop.headshop_addon.quiet import quiet
 from headshop.sim.landmarks.find import FoundLandmarks
-from headshop.sim.progress import Progress
+from headshop.sim.progress import Progress, finish
 from headshop.sim.scan.ply import write_ply
 
 
@@ -134,3 +134,30 @@ def test_doubtful_axes_are_told(bpy, reference, tmp_path, monkeypatch, capfd, up
     out = capfd.readouterr().out
     assert ("by the landmarks that were found the head is turned by 180 degrees" in out) == doubt
     assert out.count("\n") == 1 + doubt
+
+
+@pytest.mark.parametrize("bad", [2.0, 12.0])
+def test_what_is_unlike_faces_is_told(bpy, reference, tmp_path, monkeypatch, capfd, bad):
+    """A headset, of which the lower edges passed for a face, became a head without a word."""
+    from headshop.headshop_addon import heads, pipeline
+
+    def found(mesh, **options):
+        yield Progress(0.5, "")
+        places = reference.landmark_positions()
+        return FoundLandmarks(places, dict.fromkeys(places, 0.9), (), (), 1.0, bad)
+
+    def built(scan, landmarks, name, **options):
+        yield Progress(0.5, "")
+        heads.create_head(reference, name)
+        return heads.find_heads()[0], {"fit": {"advice": "And this."}}
+
+    monkeypatch.setattr(pipeline, "find_landmarks", found)
+    monkeypatch.setattr(pipeline, "build", built)
+    scan = tmp_path / "scan.ply"
+    write_ply(scan, reference.skin)
+    assert main(["landmarks", str(scan), "-o", str(tmp_path / "found.json")]) == 0
+    assert ("unlike most faces" in capfd.readouterr().out) == (bad > 7)
+    skin, report = finish(pipeline.build_alone(scan, "Fran"))
+    assert ("unlike most faces" in report["fit"]["advice"]) == (bad > 7)
+    assert report["fit"]["advice"].endswith("And this.") and heads.read_report(skin) in ({}, report)
+    assert bool(heads.read_report(skin)) == (bad > 7)

@@ -56,6 +56,19 @@ def test_a_scan_comes_in_in_its_own_unit(imported, reference, unit, options, nam
     assert facts["unit_scale"] == pytest.approx(unit, rel=1e-6 if name in ("cm", "custom") else 0.04)
 
 
+@pytest.mark.parametrize("bad", [2.0, 12.0])
+def test_a_find_that_is_unlike_faces_is_told(addon, imported, monkeypatch, capfd, bad):
+    imported(1000.0)
+
+    def found(mesh, any_size=False, usual=()):
+        yield Progress(0.5, "")
+        return FoundLandmarks({"prn": np.zeros(3)}, {"prn": 0.9}, (), (), 1.0, bad)
+
+    monkeypatch.setattr(find, "find_landmarks", found)
+    assert addon.ops.headshop.find_landmarks() == {"FINISHED"}
+    assert ("unlike most faces" in capfd.readouterr().out) == (bad > 7)
+
+
 def test_a_scan_of_no_persons_size_becomes_one_with_its_landmarks(addon, imported, reference, monkeypatch):
     from headshop.headshop_addon import scan_landmarks
 

@@ -29,7 +29,7 @@ from .shape_space import shape_space
 from .sure import SURE
 from .under_hair import fit_under_hair, hair_over, in_face
 from .unseen_jaw import with_unseen_jaw
-from .verdict import misfit_of
+from .verdict import ODD, judged
 
 #: Landmarks that the shape tells better than the range map.
 OWN = set("v op eu g n se ps pi ex ft ac sbal li ch sa sba pa obs".split())
@@ -37,6 +37,8 @@ OWN = set("v op eu g n se ps pi ex ft ac sbal li ch sa sba pa obs".split())
 #: that from the shape, mm on a head of the reference's size, the shape was the nearer one in 13 of 15 cases on 29 scans. So do
 #: lips at which the scan ends.
 ABOUT_LIPS, ASTRAY = set("ls cph sto sl pg gn".split()), 5.0
+
+UNLIKE = "What was found is unlike most faces: see whether the landmarks lie on one."
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +48,7 @@ class FoundLandmarks:
     positions : name -> (3,) mm in the mesh's own place, all 60 but the ``missing``
     confidence : name -> 0..1
     mid_air : names of those that lie where the scan has a hole; missing : names of those nothing says where they are
-    unit_scale : mm per unit of the mesh; misfit : mean distance of a face to the scan, mm
+    unit_scale : mm per unit of the mesh; bad : how unlike a face that is on which they were found, see `verdict.judged`
     """
 
     positions: dict[str, np.ndarray]
@@ -54,7 +56,7 @@ class FoundLandmarks:
     mid_air: tuple[str, ...]
     missing: tuple[str, ...]
     unit_scale: float = 1.0
-    misfit: float = 0.0
+    bad: float = 0.0
 
     def placed(self, positions: dict[str, np.ndarray]) -> "FoundLandmarks":
         """The same landmarks with other ``positions``."""
@@ -69,6 +71,11 @@ class FoundLandmarks:
         words = f"{len(self.positions) - len(self.mid_air)} landmarks found"
         words += f", {len(self.mid_air)} in mid-air over holes" if self.mid_air else ""
         return words + (f", {len(self.missing)} missing" if self.missing else "")
+
+    @property
+    def doubt(self) -> str:
+        """What to say of a find that may be no face; nothing of others."""
+        return UNLIKE if self.bad > ODD else ""
 
 
 def find_landmarks(
@@ -120,7 +127,7 @@ def _finding(mesh: Mesh, reference: Head | None, unit_scales, any_size: bool, us
         fit, space = yield from run(with_unseen_jaw(space, target, fit), 0.8, 0.81, "Looking for the mouth")
     if space.of_infants:
         fit = yield from run(with_mouth_in_place(space, target, fit), 0.81, 0.82, "Looking for the mouth")
-    misfit = misfit_of(space, fit)
+    bad = judged(reference, space, fit, 0.0).bad
     fit, shown = yield from run(fit_expression(space, target, fit, scan), 0.82, 0.88, "Looking at lips and lids")
     hair = yield from run(fit_under_hair(space, haired, fit, shown, fringe=fringe), 0.88, 0.89, "Looking for hair")
     again = yield from run(with_mouth_again(space, target, hair, shown), 0.89, 0.895, "Looking for the mouth")
@@ -153,7 +160,7 @@ def _finding(mesh: Mesh, reference: Head | None, unit_scales, any_size: bool, us
         mid_air += ("sto",) if shown.parted and "sto" in positions and "sto" not in mid_air else ()
     rest = reference.landmark_positions()
     confidence = judge_together(positions, confidence, mid_air, rest, shown, hair.hidden)
-    return FoundLandmarks(positions, confidence, mid_air, missing, scale, misfit)
+    return FoundLandmarks(positions, confidence, mid_air, missing, scale, bad)
 
 
 def better_of(shape, by_map, misled: bool, scale: float) -> dict[str, np.ndarray]:
