@@ -32,7 +32,8 @@ LEAST = 400.0  # mm² of a piece
 END = 20.0  # above the lowest of the scan, to which it ends
 UNDER = 20.0  # behind clothes, to which they hide skin
 #: How unlike skin, as a logarithm, the ratios of green and blue to red are at least, in terms of what grey is, and of what half
-#: of the face is; how much darker than it, as a logarithm of light, no skin is.
+#: of the face is; how much darker than it, as a logarithm of light, no skin is. Of one man in warm light, for whom grey is
+#: 1.36, the throat is .5 and the collar 1.1 to 1.4.
 UNLIKE, AS_GREY, OWN, DARKER = 0.35, 0.6, 3.0, -2.6
 BLACK = 0.002  # linear light, beneath which colours are noise
 FEWEST = 50  # vertices that skin's colour is learnt from
@@ -49,12 +50,12 @@ def clothing_over(space: ShapeSpace, fit: ShapeFit, target: Surface, scan: Mesh 
         return none
     size = fit.pose.scale
     light, seen = _colours(target, scan, size)
-    skin = _skin(space, fit, target, light, seen)
+    unlike = _unlike_skin(space, fit, target, light, seen)
     low = np.flatnonzero(_may_be(space, fit, target.vertices))
-    if skin is None or not len(low):
+    if unlike is None or not len(low):
         return none
     some = np.zeros(len(target.vertices), dtype=bool)
-    some[low] = skin(light[low])
+    some[low] = unlike(light[low])
     piece, area = pieces(target, some)
     reaching = np.zeros(len(area), dtype=bool)
     height = target.vertices @ fit.pose.turn[:, 2]
@@ -88,7 +89,7 @@ def _colours(target, scan, size):
     return np.log(np.maximum(linear, BLACK)), away[:, 0] < 2 * AROUND * size
 
 
-def _skin(space, fit, target, light, seen):
+def _unlike_skin(space, fit, target, light, seen):
     """A callable that tells which logarithms of colours (k, 3) are not those of the face's skin; None: too little is seen."""
     face = fit.points[(space.face > 0.5) & (fit.trust > 0.5)]
     if not len(face):
