@@ -97,6 +97,7 @@ class LidContact:
         if near is not None:
             edge, share = slice(2 * len(self.edge)), np.tile(near, 2)
             most[edge] += share * (EDGE[1] * size - most[edge])
+            # The lids of a larger eye stand no farther off it.
             most[edge] = np.maximum(most[edge] / max(size, 1.0) - EASE, least[edge])
         move = np.zeros(len(self.rows))
         best, least_wrong = None, np.inf
