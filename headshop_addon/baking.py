@@ -10,7 +10,7 @@ from ..sim.acting import arkit, expressions, outer
 from ..sim.acting.models import DEFAULT
 from ..sim.errors import InputError
 from ..sim.progress import Work, portion
-from . import head_place, heads, performance, rig_keys, shape_keys
+from . import head_place, heads, own_data, performance, rig_keys, shape_keys
 from .provenance import timed, versions
 
 SETS = ("expressions", "muscles", "arkit")
@@ -97,7 +97,7 @@ def bake_acted(
 def is_baked(skin: bpy.types.Object) -> bool:
     """Whether shapes, a rig or a performance were baked onto the head."""
     return bool(shape_keys.baked_names(skin)) or any(
-        heads.note(obj, performance.PERFORMANCE) is not None for obj in heads.parts_of(skin).values()
+        own_data.note(obj, performance.PERFORMANCE) is not None for obj in heads.parts_of(skin).values()
     )
 
 
@@ -109,8 +109,8 @@ def remove_baked(skin: bpy.types.Object) -> None:
     InputError : linked from another file.
     """
     shape_keys.require_editable(skin)
-    heads.own_meshes(skin)
-    moved = rig_keys.is_rigged(skin) or heads.note(skin, performance.PERFORMANCE) is not None
+    own_data.own_meshes(skin)
+    moved = rig_keys.is_rigged(skin) or own_data.note(skin, performance.PERFORMANCE) is not None
     rig_keys.remove_rig(skin)
     performance.remove_performance(skin)
     for obj in heads.parts_of(skin).values():

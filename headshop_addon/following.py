@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..sim.acting.models import model_named
-from . import bridge, heads, muscle_names, response
+from . import bridge, heads, muscle_names, own_data, response
 
 KEY = "Live"
 #: `HEADSHOP_PG_object.model` -> the name of a model that keeps up with a slider; instant, where it was not
@@ -61,7 +61,7 @@ kept: dict[int, Following] = {}
 
 def rest(skin) -> None:
     """Take the live pose off the head: its ``Live`` shape keys are removed."""
-    heads.own_meshes(skin)
+    own_data.own_meshes(skin)
     for obj in heads.parts_of(skin).values():
         keys = obj.data.shape_keys
         block = keys.key_blocks.get(KEY) if keys else None
@@ -105,7 +105,7 @@ def pose(skin, values, iterations) -> Following | None:
     else:  # rest is the scan itself, exactly
         following.state, posed = following.acting.rest_state(following.model), following.neutral
         following.frames = following.acting.follower(following.model)  # what comes next begins here, undone or not
-    heads.own_meshes(skin)
+    own_data.own_meshes(skin)
     objects = heads.parts_of(skin)
     for part, vertices in posed.items():
         _write(skin, objects[part], vertices - following.neutral[part])

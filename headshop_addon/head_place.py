@@ -10,7 +10,7 @@ import numpy as np
 
 from ..sim.acting.head_motion import HeadMotion, felt
 from ..sim.acting.turbulence import gusty
-from . import bridge, heads, live
+from . import bridge, live, own_data
 from .slotted_actions import animate, new_action, stop
 
 PLACED = "headshop_placed"
@@ -85,13 +85,13 @@ def write_motion(skin: bpy.types.Object, motion: HeadMotion, frames: np.ndarray,
     curves = {("delta_location", axis): places[:, axis] for axis in range(3)}
     curves |= {("delta_rotation_euler", axis): np.array(angles)[:, axis] for axis in range(3)}
     animate(new_action(name), skin, "OBJECT", frames, curves)
-    heads.keep_note(skin, PLACED, True)
+    own_data.keep_note(skin, PLACED, True)
 
 
 def remove_motion(skin: bpy.types.Object) -> None:
     """Take a motion that `write_motion` wrote off a head again."""
-    if not heads.note(skin, PLACED):
+    if not own_data.note(skin, PLACED):
         return
     stop(skin)
     skin.delta_location = skin.delta_rotation_euler = (0.0, 0.0, 0.0)
-    heads.drop_note(skin, PLACED)
+    own_data.drop_note(skin, PLACED)

@@ -16,7 +16,7 @@ from ..sim.acting.principal import principal_shapes
 from ..sim.errors import InputError
 from ..sim.progress import Progress, Work
 from ..sim.tissue.posing import posed_parts
-from . import bridge, head_place, heads, shape_keys
+from . import bridge, head_place, heads, own_data, shape_keys
 from .slotted_actions import animate_keys, curves_of, keyed_by_us, moved_otherwise, new_action, stop, value_path
 
 PERFORMANCE = "headshop_performance"
@@ -146,7 +146,7 @@ def _in_time(acting, built, controls, fps):
 
 def write_performance(skin, found: dict, frames: np.ndarray, name: str) -> None:
     """Store part -> `Principal` as shape keys of each part and one action with a slot for each."""
-    heads.own_meshes(skin)
+    own_data.own_meshes(skin)
     remove_performance(skin)
     action = new_action(f"{heads.head_name(skin)} {name}")
     for part, obj in heads.parts_of(skin).items():
@@ -159,7 +159,7 @@ def write_performance(skin, found: dict, frames: np.ndarray, name: str) -> None:
             block.slider_min, block.slider_max = -1.0, 1.0
             bridge.write_positions(obj, basis + shape @ turn, block.name)
             weights[block.name] = found[part].weights[:, number]
-        heads.keep_note(obj, PERFORMANCE, json.dumps(list(weights)))
+        own_data.keep_note(obj, PERFORMANCE, json.dumps(list(weights)))
         animate_keys(action, obj.data.shape_keys, frames, weights)
     if not len(action.slots):
         bpy.data.actions.remove(action)  # nothing moves
@@ -170,7 +170,7 @@ def write_performance(skin, found: dict, frames: np.ndarray, name: str) -> None:
 
 def baked_weights(skin: bpy.types.Object) -> tuple[list[str], np.ndarray, np.ndarray] | None:
     """The skin's shape keys of a baked performance, its frames (f,) and their weights (f, k); None if there is none."""
-    names = json.loads(heads.note(skin, PERFORMANCE, "[]"))
+    names = json.loads(own_data.note(skin, PERFORMANCE, "[]"))
     curves = {} if skin.data.shape_keys is None else keyed_by_us(skin.data.shape_keys)
     keyed = {name: curves.get(value_path(name)) for name in names}
     names = [name for name, curve in keyed.items() if curve is not None]
@@ -190,9 +190,9 @@ def remove_performance(skin: bpy.types.Object) -> None:
     """Take a baked performance off a head."""
     head_place.remove_motion(skin)
     for obj in heads.parts_of(skin).values():
-        names = json.loads(heads.note(obj, PERFORMANCE, "[]"))
+        names = json.loads(own_data.note(obj, PERFORMANCE, "[]"))
         if obj.data.shape_keys is not None:
             stop(obj.data.shape_keys)
         shape_keys.remove_keys(obj, names)
-        if heads.note(obj, PERFORMANCE) is not None:
-            heads.drop_note(obj, PERFORMANCE)
+        if own_data.note(obj, PERFORMANCE) is not None:
+            own_data.drop_note(obj, PERFORMANCE)

@@ -14,7 +14,7 @@ from ..sim.acting import models
 from ..sim.errors import InputError
 from ..sim.progress import Work, portion
 from ..sim.response.engine import engine_mark
-from . import bridge, heads
+from . import bridge, heads, own_data
 
 RESPONSE = "headshop_response"
 OF = "headshop_response_of"
@@ -30,13 +30,13 @@ def fingerprint(skin: bpy.types.Object) -> int:
 
 def is_prepared(skin: bpy.types.Object) -> bool:
     """Whether a response is kept with the head, up to date or not."""
-    return heads.note(skin, RESPONSE) is not None
+    return own_data.note(skin, RESPONSE) is not None
 
 
 def is_current(skin: bpy.types.Object, mark: int | None = None) -> bool:
     """Whether the response kept with the head was learnt on the head as it is and from this simulation; ``mark`` is its
     `fingerprint`, if known."""
-    return is_prepared(skin) and heads.note(skin, OF) == f"{fingerprint(skin) if mark is None else mark:08x}"
+    return is_prepared(skin) and own_data.note(skin, OF) == f"{fingerprint(skin) if mark is None else mark:08x}"
 
 
 def prepare(skin: bpy.types.Object, care: str = "normal") -> Work:
@@ -55,9 +55,9 @@ def prepare(skin: bpy.types.Object, care: str = "normal") -> Work:
         raise InputError(f"{skin.name!r} is linked from another file: prepare the response in that file.")
     mark = fingerprint(skin)
     rig, accuracy = yield from build_rig(heads.read_head(skin), care)
-    heads.own_meshes(skin)
-    heads.keep_note(skin, RESPONSE, to_bytes(rig, accuracy))
-    heads.keep_note(skin, OF, f"{mark:08x}")
+    own_data.own_meshes(skin)
+    own_data.keep_note(skin, RESPONSE, to_bytes(rig, accuracy))
+    own_data.keep_note(skin, OF, f"{mark:08x}")
     return rig, accuracy
 
 
@@ -77,7 +77,7 @@ def stored(skin: bpy.types.Object):
             f"{heads.head_name(skin)!r} was reshaped since its response was prepared, or another version prepared it: "
             "prepare it again."
         )
-    return from_bytes(bytes(heads.note(skin, RESPONSE)), heads.read_head(skin))
+    return from_bytes(bytes(own_data.note(skin, RESPONSE)), heads.read_head(skin))
 
 
 def stored_or_prepared(skin: bpy.types.Object, stop: float) -> Work:
@@ -96,7 +96,7 @@ def acted(skin: bpy.types.Object, mark: int | None = None):
     if not is_current(skin, mark):
         return None
     head = heads.read_head(skin)
-    return actor_of(from_bytes(bytes(heads.note(skin, RESPONSE)), head)[0], head)
+    return actor_of(from_bytes(bytes(own_data.note(skin, RESPONSE)), head)[0], head)
 
 
 def require_own_model(model: str) -> None:

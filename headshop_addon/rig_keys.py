@@ -18,7 +18,7 @@ from ..sim.response.keys import Keys, chosen_keys
 from ..sim.response.mixtures import SIGNED
 from ..sim.response.playing import played_parts, played_poses
 from ..sim.response.quantities import letters, sliders
-from . import bridge, heads, response, shape_keys
+from . import bridge, heads, own_data, response, shape_keys
 
 QUANTITIES = "headshop_rig"  # on the skin's object: names of the custom properties that belong to the rig
 RANGE = 10.0  # what Blender allows the value of a shape key
@@ -56,7 +56,7 @@ def bake_rig(skin: bpy.types.Object) -> Work:
 
 def write_rig(skin: bpy.types.Object, keys: Keys) -> None:
     """Store `Keys` as shape keys with drivers, in place of an earlier rig and of our keys by the sliders' names."""
-    heads.own_meshes(skin)
+    own_data.own_meshes(skin)
     remove_rig(skin)
     parts = heads.parts_of(skin)
     for part, each in keys.parts.items():
@@ -73,12 +73,12 @@ def write_rig(skin: bpy.types.Object, keys: Keys) -> None:
             block.slider_min, block.slider_max, block.lock_shape = -RANGE, RANGE, True
         peaks = {name: {"peak_mm": _peak(shape)} for name, shape in each.plain.items()}
         peaks |= {name: {"peak_mm": _peak(shape), "driven": True} for name, (_, shape) in each.driven.items()}
-        heads.keep_note(obj, shape_keys.SHAPES, json.dumps(shape_keys.baked_report(obj) | peaks))
+        own_data.keep_note(obj, shape_keys.SHAPES, json.dumps(shape_keys.baked_report(obj) | peaks))
     sources = skin.data.shape_keys
     for name, formula in keys.quantities.items():
         sources[name] = 0.0
         _drive(sources.driver_add(f'["{name}"]').driver, sources, formula, keys)
-    heads.keep_note(skin, QUANTITIES, json.dumps(list(keys.quantities)))
+    own_data.keep_note(skin, QUANTITIES, json.dumps(list(keys.quantities)))
     for part, each in keys.parts.items():
         blocks = parts[part].data.shape_keys.key_blocks
         for name in each.plain if part != "skin" else ():
@@ -117,7 +117,7 @@ def _drive(driver: bpy.types.Driver, sources: bpy.types.Key, formula, keys: Keys
 
 def is_rigged(skin: bpy.types.Object) -> bool:
     """Whether a rig was baked onto the head."""
-    return heads.note(skin, QUANTITIES) is not None
+    return own_data.note(skin, QUANTITIES) is not None
 
 
 def remove_rig(skin: bpy.types.Object) -> None:
@@ -127,8 +127,8 @@ def remove_rig(skin: bpy.types.Object) -> None:
     for obj in heads.parts_of(skin).values():
         shape_keys.remove_keys(obj, shape_keys.driven_names(obj))
     keys = skin.data.shape_keys
-    for name in json.loads(heads.note(skin, QUANTITIES)):
+    for name in json.loads(own_data.note(skin, QUANTITIES)):
         if keys is not None and name in keys:
             keys.driver_remove(f'["{name}"]')
             del keys[name]
-    heads.drop_note(skin, QUANTITIES)
+    own_data.drop_note(skin, QUANTITIES)

@@ -17,7 +17,7 @@ from ..sim.errors import InputError
 from ..sim.mesh_subdivision import drawn
 from ..sim.progress import Progress, Work
 from ..sim.tissue.posing import posed_parts
-from . import bridge, heads
+from . import bridge, heads, own_data
 
 SHAPES = "headshop_shapes"
 SCANNED = "Scan"  # the face with the expression that it was scanned with, if that was taken away
@@ -127,7 +127,7 @@ def _there(obj: bpy.types.Object) -> dict[str, dict]:
 def baked_report(obj: bpy.types.Object) -> dict[str, dict]:
     """Name of each baked shape -> its report."""
     try:
-        return json.loads(heads.note(obj, SHAPES, "{}"))
+        return json.loads(own_data.note(obj, SHAPES, "{}"))
     except (ValueError, TypeError):
         return {}
 
@@ -145,7 +145,7 @@ def refuse_foreign(skin: bpy.types.Object, names) -> None:
 
 def write_shapes(skin: bpy.types.Object, shapes: dict[str, dict[str, np.ndarray]], report: dict[str, dict]) -> None:
     """Store name -> part -> displacements (n, 3) mm as shape keys with drivers, in place of ours of the same names."""
-    heads.own_meshes(skin)
+    own_data.own_meshes(skin)
     parts = heads.parts_of(skin)
     for part, obj in parts.items():
         moving = {
@@ -164,7 +164,7 @@ def write_shapes(skin: bpy.types.Object, shapes: dict[str, dict[str, np.ndarray]
                 follow(block, skin.data.shape_keys, name)
         kept = {name: value for name, value in ours.items() if name not in shapes}
         if moving or ours:
-            heads.keep_note(obj, SHAPES, json.dumps(kept | {name: report.get(name, {}) for name in moving}))
+            own_data.keep_note(obj, SHAPES, json.dumps(kept | {name: report.get(name, {}) for name in moving}))
 
 
 def remove_keys(obj: bpy.types.Object, names) -> None:
@@ -176,8 +176,8 @@ def remove_keys(obj: bpy.types.Object, names) -> None:
         block.driver_remove("value")
         obj.shape_key_remove(block)
     ours = {name: value for name, value in baked_report(obj).items() if name not in names}
-    if heads.note(obj, SHAPES) is not None:
-        heads.keep_note(obj, SHAPES, json.dumps(ours))
+    if own_data.note(obj, SHAPES) is not None:
+        own_data.keep_note(obj, SHAPES, json.dumps(ours))
     if there and len(keys.key_blocks) == 1:
         obj.shape_key_remove(keys.key_blocks[0])
 
