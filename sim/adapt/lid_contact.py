@@ -18,7 +18,7 @@ from ..mesh_subdivision import smoother
 
 #: mm over the ball that samples of the lids aim at: the inner edge of the margins at least and most, the rest at least.
 EDGE, BEHIND = (0.07, 0.38), 0.05
-EASE = 0.02  # mm: the inner edge of a fitted lid aims at so much less than its bound, as what is beside it holds it off
+EASE = 0.02  # mm: where the inner edge must come nearer it aims at so much less than its bound, as its neighbours hold it off
 #: mm that the lids' backs may stand farther off than they do on the reference.
 NEAR = 0.5
 #: Rounds, those after which the best is kept, and weights of a violated bound and of smoothness against that of moving at all.
@@ -97,8 +97,9 @@ class LidContact:
         if near is not None:
             edge, share = slice(2 * len(self.edge)), np.tile(near, 2)
             most[edge] += share * (EDGE[1] * size - most[edge])
-            # The lids of a larger eye stand no farther off it.
-            most[edge] = np.maximum(most[edge] / max(size, 1.0) - EASE, least[edge])
+            bound = most[edge] / max(size, 1.0)  # the lids of a larger eye stand no farther off it
+            off = height_over(self.all[edge] @ out, eye) > bound  # lids that lie well stay where they are
+            most[edge] = np.maximum(bound - EASE * off, least[edge])
         move = np.zeros(len(self.rows))
         best, least_wrong = None, np.inf
         for turn in range(ROUNDS):
