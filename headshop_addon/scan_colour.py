@@ -2,7 +2,8 @@
 """The scan's colours carried over to the skin: an image on the skin's UV map, its holes filled, its light evened.
 
 Colour comes from the scan points nearest to each texel; where there are none near enough, it spreads over the surface
-like a membrane. Broad changes of brightness are taken to be light, not skin, and are partly taken out.
+like a membrane that goes back to the tone of most of the skin. Broad changes of brightness are taken to be light, not
+skin, and are partly taken out.
 """
 
 import bpy
@@ -10,7 +11,7 @@ import numpy as np
 from scipy.ndimage import distance_transform_edt
 from scipy.spatial import cKDTree
 
-from ..sim.mesh import Mesh, ends_of, vertex_normals
+from ..sim.mesh import Mesh, ends_of, vertex_areas, vertex_normals
 from ..sim.progress import Progress, Work
 from ..sim.scan.colour_space import LUMINANCE, to_linear, to_srgb
 from ..sim.scan.specks import specks
@@ -129,7 +130,7 @@ def vertex_colour(skin: Mesh, source: ScanColour, unseen: np.ndarray) -> tuple[n
     link = adjacency(skin)
     # islands of doubtful colour at the edge of holes count less
     confidence = confidence * np.clip(2 * smoothed(confidence, link, 3) - 0.5, 0, 1)
-    colour = spread(colour, confidence, link)
+    colour = spread(colour, confidence, link, vertex_areas(skin.vertices, skin.triangles))
     bright = np.log(np.maximum(colour @ LUMINANCE, 0.004))
     broad = smoothed(bright, link, 60)
     centre = np.average(broad, weights=confidence + 1e-9)

@@ -7,6 +7,7 @@ from scipy.sparse import coo_matrix, diags, identity
 from scipy.sparse.linalg import spsolve
 
 from ..sim.mesh import Mesh, edges
+from ..sim.scan.colour_space import LUMINANCE
 from .skin_material import BROW, COLOUR, MASK, REST
 
 #: Linear sRGB albedo of fair skin where the scan says nothing (type II; estimate between published spectra).
@@ -26,6 +27,8 @@ TINTS = {
     "scalp": (0.7, (0.93, 0.95, 0.97)),
     "jaw": (0.25, (0.94, 0.95, 0.98)),
 }
+HOME = 40.0  # mm from where its colour was seen to where skin has less than half of that and more of the usual tone
+TONE = (0.4, 0.8)  # shares of the skin that are darker than the usual tone, from and to
 SHINE = {"nose": 1.0, "forehead": 0.7, "chin": 0.5, "lid_upper": 0.4, "cheek": 0.15}
 
 
@@ -46,20 +49,28 @@ def smoothed(values: np.ndarray, link, rounds: int = 2) -> np.ndarray:
     return values
 
 
-def spread(values: np.ndarray, confidence: np.ndarray, link, reach: float = 1e-3) -> np.ndarray:
-    """Values (n, k) kept where the confidence (n,) is 1 and filled smoothly over the surface where it is 0.
+def spread(colour: np.ndarray, confidence: np.ndarray, link, area: np.ndarray, reach: float = 1e-3) -> np.ndarray:
+    """Colours (n, 3) kept where the confidence (n,) is 1 and filled over the surface where it is 0, smoothly and, farther in
+    than `HOME`, with the tone of most of the skin: shade and reflections at the edge of what was seen go no farther.
 
-    Solves (C + reach L) x = C v with the graph's Laplacian L, which is a membrane pinned at the known values.
+    Solves (C + reach (L + A / HOME²)) x = C v with the graph's Laplacian L, which is a membrane pinned at the known values and,
+    by the ``area`` (n,) mm² of each vertex, held by springs where there are none.
     """
     degree = np.asarray(link.sum(axis=1)).ravel()
-    laplacian = diags(degree) - link
-    # a whisper of pull towards the mean keeps a part without any data from being singular
-    pinned = diags(confidence + 1e-9)
-    mean = np.average(values, axis=0, weights=confidence + 1e-9)
-    system = (pinned + reach * laplacian).tocsc()
-    return np.column_stack(
-        [spsolve(system, pinned @ (column - m)) + m for column, m in zip(values.T, mean, strict=True)]
-    )
+    pinned = diags(confidence + 1e-9)  # a whisper that keeps a part without any data from being singular
+    held = diags((1 - confidence) * area / HOME**2)
+    system = (pinned + reach * (diags(degree) - link + held)).tocsc()
+    tone = tone_of(colour, confidence)
+    return np.column_stack([spsolve(system, pinned @ (c - t)) + t for c, t in zip(colour.T, tone, strict=True)])
+
+
+def tone_of(colour: np.ndarray, confidence: np.ndarray) -> np.ndarray:
+    """(3,) what most of the skin looks like, of colours (n, 3) with a confidence (n,) 0..1: the mean of those that are rather
+    bright, as brows and shade darken more of it than gloss brightens."""
+    known = colour[confidence > 0.5] if (confidence > 0.5).any() else colour
+    bright = known @ LUMINANCE
+    low, high = np.quantile(bright, TONE)
+    return known[(bright >= low) & (bright <= high)].mean(axis=0)
 
 
 def group(groups: dict[str, np.ndarray], name: str, count: int) -> np.ndarray:

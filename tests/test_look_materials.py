@@ -133,6 +133,29 @@ def test_the_scans_colours_arrive_and_spread_where_it_has_none(reference):
     assert 0.05 < colour[nearest["op"]].min() and colour[nearest["op"]].max() < 0.45
 
 
+def test_shade_under_the_chin_does_not_go_down_the_neck(reference):
+    """Where it was seen it stays, its light evened; the neck, which was not, has the face's tone on its lower half."""
+    from headshop.headshop_addon.scan_colour import ScanColour, vertex_colour
+    from headshop.sim.mesh import Mesh
+    from headshop.sim.scan.colour_space import to_srgb
+
+    skin, at = reference.skin, reference.landmark_positions()
+    below = at["gn"][2] - skin.vertices[:, 2]
+    shade = (below > -5) & (np.abs(skin.vertices[:, 0]) < 60)
+    linear = np.where(shade[:, None], 0.2, 1.0) * np.array([0.4, 0.25, 0.2])
+    seen = (skin.vertices[:, 1] < at["t_l"][1]) & (below < 15)
+    triangles = skin.triangles[seen[skin.triangles].all(axis=1)]
+    scan = Mesh.from_triangles(skin.vertices, triangles, colour=to_srgb(linear).astype(np.float32))
+    colour, _ = vertex_colour(skin, ScanColour(scan), reference.groups["inner"])
+    outer = reference.groups["inner"] < 0.5
+    assert colour[outer & seen & shade & (below < 5), 0].mean() < 0.12
+    neck = outer & (below > 60)
+    assert neck.sum() > 50 and colour[neck, 0].min() > 0.25
+    np.testing.assert_allclose(
+        colour[neck].mean(axis=0) / colour[neck].mean(), np.array([0.4, 0.25, 0.2]) * 3 / 0.85, rtol=1e-3
+    )
+
+
 def test_hair_does_not_stain_the_skin_below(reference):
     from headshop.headshop_addon.scan_colour import ScanColour, unseen_skin, vertex_colour
     from headshop.sim.scan.colour_space import to_linear, to_srgb
