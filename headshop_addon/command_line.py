@@ -42,13 +42,17 @@ def parser() -> argparse.ArgumentParser:
     common.add_argument("--debug", action="store_true", help="on errors, show where in the program they happened")
     common.add_argument("--quiet", action="store_true", help="no progress bar and no summary")
     plain = argparse.ArgumentParser(add_help=False)
-    plain.add_argument("--export", metavar="DIR", help="also write plain files (PLY, JSON, NPZ, PNG; mm) into DIR")
+    plain.add_argument(
+        "--export", type=_path, metavar="DIR", help="also write plain files (PLY, JSON, NPZ, PNG; mm) into DIR"
+    )
     chosen = argparse.ArgumentParser(add_help=False)
-    chosen.add_argument("head", metavar="HEAD.blend", help="a file that headshop build or the add-on made")
+    about = "a file that headshop build or the add-on made"
+    chosen.add_argument("head", type=_path, metavar="HEAD.blend", help=about)
     chosen.add_argument("--head", dest="name", metavar="NAME", help="which head, if the file holds several")
     reading = argparse.ArgumentParser(add_help=False)
     reading.add_argument(
         "scan",
+        type=_path,
         metavar="SCAN",
         help="PLY, OBJ, STL, glTF, USD, FBX, a range map (ECH, NPZ, JSON), or points (PLY, PCD, XYZ, PTS, CSV)",
     )
@@ -63,7 +67,8 @@ def parser() -> argparse.ArgumentParser:
         return commands.add_parser(name, help=about, description=about, parents=[*parents, common], allow_abbrev=False)
 
     build = command("build", "Turn a scan into an animatable head.", reading, plain)
-    build.add_argument("--landmarks", metavar="FILE", help="landmark file (default: found automatically)")
+    about = "landmark file (default: found automatically)"
+    build.add_argument("--landmarks", type=_path, metavar="FILE", help=about)
     sizes = (0, 512, 1024, 2048, 4096)
     about = "pixels along a side of the displacement and normal map, 0 for none (default: 1024)"
     build.add_argument("--detail", type=int, choices=sizes, default=1024, metavar="SIZE", help=about)
@@ -73,35 +78,44 @@ def parser() -> argparse.ArgumentParser:
     leave = "what to leave out as no skin: auto (all of it; the default), never, or of these, with commas between: "
     leave += "depth_jumps, flat_ends, held_by_lips, hair, glasses, beard, clothing"
     build.add_argument("--leave-out", default="auto", metavar="WHAT", help=leave)
-    build.add_argument("-o", "--output", required=True, metavar="HEAD.blend")
+    build.add_argument("-o", "--output", type=_path, required=True, metavar="HEAD.blend")
 
     landmarks = command("landmarks", "Find the landmarks of a scan.", reading)
-    landmarks.add_argument("-o", "--output", required=True, metavar="FILE")
+    landmarks.add_argument("-o", "--output", type=_path, required=True, metavar="FILE")
 
     bake = command("bake", "Simulate poses or a performance into shape keys.", chosen, plain)
     sets = "simulate each pose of a set into a shape key; rig: sliders that play the simulation together, by drivers"
     bake.add_argument("--set", choices=SETS, dest="poses", help=sets)
-    bake.add_argument("--performance", metavar="FILE", help="simulate a performance into shape key animation")
+    about = "simulate a performance into shape key animation"
+    bake.add_argument("--performance", type=_path, metavar="FILE", help=about)
     about = "with the performance, let flesh swing, and feel the head's motion and gusts of wind"
     bake.add_argument("--dynamic", action="store_true", help=about)
     about = "the model that acts: " + ", ".join(f"{m.name} ({m.title})" for m in models.MODELS.values())
     about += f" (default: {models.DEFAULT})"
     bake.add_argument("--model", choices=tuple(models.MODELS), default=models.DEFAULT, metavar="NAME", help=about)
-    bake.add_argument("-o", "--output", metavar="OUT.blend", help="(default: HEAD.blend itself)")
+    bake.add_argument("-o", "--output", type=_path, metavar="OUT.blend", help="(default: HEAD.blend itself)")
 
     render = command("render", "Render a contact sheet or an animation.", chosen)
     about = "an expression of the table (default: smile) by each model side by side (PNG)"
     render.add_argument("--models", nargs="?", const="smile", metavar="EXPRESSION", help=about)
     render.add_argument("--fit", action="store_true", help="the distance from the scan as a heat map (PNG)")
-    render.add_argument("-o", "--output", required=True, metavar="SHEET.png|MOVIE.mp4")
+    render.add_argument("-o", "--output", type=_path, required=True, metavar="SHEET.png|MOVIE.mp4")
 
     export = command("export", "Write an engine-ready copy: no modifiers, exact names.", chosen)
-    export.add_argument("-o", "--output", required=True, metavar="FILE.glb|fbx|usdc|usdz")
+    export.add_argument("-o", "--output", type=_path, required=True, metavar="FILE.glb|fbx|usdc|usdz")
 
     sample = command("sample", "Write the embedded sample subject: scan, landmarks, truth.")
     sample.add_argument("--seed", type=_seed, default=None, help="another individual: a whole number from 0 up")
-    sample.add_argument("-o", "--output", required=True, metavar="DIR")
+    sample.add_argument("-o", "--output", type=_path, required=True, metavar="DIR")
     return program
+
+
+def _path(text: str) -> str:
+    """What the name of a file or folder may be. An empty one, as a script's unset variable gives, would mean the current
+    folder."""
+    if not text:
+        raise argparse.ArgumentTypeError("the name is empty: give one")
+    return text
 
 
 def _unit(text: str) -> str:
