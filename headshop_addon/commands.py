@@ -34,7 +34,7 @@ def build(options) -> None:
     _require_kind(options.output, _BLEND)
     to_leave_out(options.leave_out)
     landmarks = None if options.landmarks is None else read_landmark_file(options.landmarks)
-    with Outputs() as outputs:
+    with Outputs((options.scan, options.landmarks)) as outputs:
         blend = outputs.file(options.output)
         plain = _plain_folder(outputs, options)
         start_blender()
@@ -64,7 +64,7 @@ def landmarks(options) -> None:
 
     _require_file(options.scan, "scan")
     _require_kind(options.output, _LANDMARKS)
-    with Outputs() as outputs:
+    with Outputs((options.scan,)) as outputs:
         file = outputs.file(options.output)
         start_blender()
         from . import pipeline
@@ -105,7 +105,7 @@ def bake(options) -> None:
         from ..sim.acting.performance import read_performance
 
         performance = read_performance(options.performance)
-    with Outputs() as outputs:
+    with Outputs((options.performance,)) as outputs:
         blend = outputs.file(output)
         plain = _plain_folder(outputs, options)
         skin = open_head(options.head, options.name)

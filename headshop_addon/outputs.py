@@ -12,10 +12,12 @@ from ..sim.errors import InputError
 class Outputs:
     """Use as ``with Outputs() as outputs``; leaving it by any exception, Ctrl-C included, removes what was begun.
 
-    Folders that had to be made for an output go too if it does not come about.
+    Folders that had to be made for an output go too if it does not come about. ``inputs`` are files that no output may
+    replace or remove.
     """
 
-    def __init__(self):
+    def __init__(self, inputs=()):
+        self._inputs = [Path(path).resolve() for path in inputs if path is not None]
         self._renames: list[tuple[Path, Path]] = []
         self._folders: list[tuple[Path, Path]] = []
         self._scratch: list[Path] = []
@@ -53,11 +55,12 @@ class Outputs:
 
         Raises
         ------
-        InputError : nothing can be written there, or it is a folder.
+        InputError : nothing can be written there, it is a folder, or an input.
         """
         path = Path(path)
         if path.is_dir():
             raise InputError(f"{path} is a folder: give the name of a file to write.")
+        self._spare_inputs(path)
         scratch = self._scratch_beside(path)
         if path.exists() and not os.access(path, os.W_OK):
             raise InputError(f"{path} is write-protected: give another output.")
@@ -76,13 +79,24 @@ class Outputs:
 
         ``names`` are all that can be written: of those, what is not written this time is removed from ``path``, so
         that no file of an earlier run stands among the new ones.
+
+        Raises
+        ------
+        InputError : nothing can be written there, it is or becomes a file, or one of ``names`` there is an input.
         """
         path = Path(path)
-        if path.exists() and not path.is_dir():
+        becoming = [final.resolve() for _, final in self._renames]
+        if (path.exists() and not path.is_dir()) or path.resolve() in becoming:
             raise InputError(f"{path} is a file: give a folder to write to.")
+        for name in names:
+            self._spare_inputs(path / name)
         scratch = self._scratch_beside(path / "any")
         self._renames += [(scratch / name, path / name) for name in names]
         return scratch
+
+    def _spare_inputs(self, path: Path) -> None:
+        if path.resolve() in self._inputs:
+            raise InputError(f"{path} would be replaced, which is an input: write to another place.")
 
     def _scratch_beside(self, path: Path) -> Path:
         folder = path.parent

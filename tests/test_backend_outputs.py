@@ -58,6 +58,27 @@ def test_a_place_that_cannot_be_written_is_refused_at_once(tmp_path):
     assert [p.name for p in tmp_path.rglob("*")] == ["file"]
 
 
+def test_inputs_are_spared(tmp_path):
+    given = tmp_path / "landmarks.json"
+    given.write_text("picked by hand")
+    (tmp_path / "link.json").symlink_to(given)
+    for begin in (
+        lambda outputs: outputs.file(tmp_path / "link.json"),
+        lambda outputs: outputs.folder(tmp_path / ".", ["skin.ply", "landmarks.json"]),
+    ):
+        with pytest.raises(InputError, match="is an input"), Outputs((given, None)) as outputs:
+            begin(outputs)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["landmarks.json", "link.json"]
+    assert given.read_text() == "picked by hand"
+
+
+def test_a_file_and_a_folder_of_one_name_are_refused(tmp_path):
+    with pytest.raises(InputError, match="head is a file"), Outputs() as outputs:
+        outputs.file(tmp_path / "head")
+        outputs.folder(tmp_path / "head", ["skin.ply"])
+    assert not list(tmp_path.iterdir())
+
+
 def test_a_rigid_motion_needs_at_most_twelve_shapes():
     rng = np.random.default_rng(0)
     points = rng.normal(size=(300, 3)) * 50

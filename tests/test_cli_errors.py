@@ -183,6 +183,14 @@ def test_an_output_that_cannot_be_written(capfd, tmp_path, scan, landmarks, outp
     )
 
 
+def test_an_output_over_an_input(capfd, tmp_path, scan, landmarks):
+    given = landmarks()
+    build = ("build", scan, "--landmarks", given, "-o", tmp_path / "head.blend")
+    assert "is an input" in fails(capfd, tmp_path, *build, "--export", given.parent)
+    assert "is a file" in fails(capfd, tmp_path, *build, "--export", tmp_path / "head.blend")
+    assert "is an input" in fails(capfd, tmp_path, "landmarks", given, "-o", given)
+
+
 def test_a_blend_that_is_none(bpy, capfd, tmp_path):
     head = tmp_path / "head.blend"
     head.write_bytes(b"This is a letter.")
