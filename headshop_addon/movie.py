@@ -89,7 +89,12 @@ def animated_frames(skin: bpy.types.Object) -> tuple[int, int]:
 
 
 def encode(pictures: list[Path], path: Path, size: tuple[int, int], fps: int, fps_base: float = 1.0) -> None:
-    """Join PNG pictures into an H.264 film without sound, by Blender's own sequencer and FFmpeg."""
+    """Join PNG pictures into an H.264 film without sound, by Blender's own sequencer and FFmpeg.
+
+    Raises
+    ------
+    InputError : it cannot be written, or not all of it; Blender does not tell.
+    """
     scene = bpy.data.scenes.new("Head Shop Film")
     try:
         # The pictures are finished: show them as they are.
@@ -119,3 +124,23 @@ def encode(pictures: list[Path], path: Path, size: tuple[int, int], fps: int, fp
             bpy.ops.render.render(animation=True, scene=scene.name)
     finally:
         bpy.data.scenes.remove(scene)
+    if not _is_whole(path):
+        raise InputError(f"{path.name} cannot be written whole: is the disk full?")
+
+
+def _is_whole(path: Path) -> bool:
+    """Whether a file consists of whole MPEG-4 boxes, with the table of frames among them."""
+    if not path.is_file():
+        return False
+    kinds, at, end = set(), 0, path.stat().st_size
+    with path.open("rb") as file:
+        while at < end:
+            file.seek(at)
+            head = file.read(16)
+            size = int.from_bytes(head[:4], "big")
+            size = int.from_bytes(head[8:], "big") if size == 1 else size
+            if size < 8:
+                return False
+            kinds.add(head[4:8])
+            at += size
+    return at == end and b"moov" in kinds

@@ -1,12 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Pictures as arrays: render one, read one, write one."""
 
+import os
 import tempfile
+from contextlib import suppress
 from pathlib import Path
 
 import bpy
 import numpy as np
 
+from ..sim.errors import InputError
 from .quiet import quiet
 
 
@@ -23,17 +26,38 @@ def read_picture(path) -> np.ndarray:
     return pixels.reshape(height, width, 4)[::-1].copy()
 
 
+#: What every PNG ends with.
+_PNG_END = b"IEND\xaeB`\x82"
+
+
 def write_picture(path, pixels: np.ndarray) -> None:
-    """Write (height, width, 4) display values 0..1, top row first, as an 8-bit PNG."""
+    """Write (height, width, 4) display values 0..1, top row first, as an 8-bit PNG.
+
+    Raises
+    ------
+    InputError : it cannot be written, or not all of it; Blender does not tell.
+    """
     height, width = pixels.shape[:2]
     image = bpy.data.images.new("Head Shop", width, height, alpha=True)
     try:
         image.pixels.foreach_set(np.ascontiguousarray(pixels[::-1], dtype=np.float32).ravel())
         image.file_format = "PNG"
         image.filepath_raw = str(path)
-        image.save()
+        with quiet(), suppress(RuntimeError):  # what came of it is looked at
+            image.save()
     finally:
         bpy.data.images.remove(image)
+    if not _is_whole(Path(path)):
+        raise InputError(f"{Path(path).name} cannot be written whole: is the disk full?")
+
+
+def _is_whole(path: Path) -> bool:
+    """Whether a file ends as a PNG does."""
+    if not path.is_file() or path.stat().st_size < len(_PNG_END):
+        return False
+    with path.open("rb") as file:
+        file.seek(-len(_PNG_END), os.SEEK_END)
+        return file.read() == _PNG_END
 
 
 def _as_png(scene) -> None:

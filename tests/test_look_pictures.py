@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Sheet and film: what is written, and that nothing of the artist's is touched."""
 
+import subprocess
+import sys
 import tempfile
 import weakref
 
@@ -221,6 +223,39 @@ def test_films_that_cannot_be_are_refused(bpy, skin, tmp_path):
     with pytest.raises(InputError, match="even numbers"):
         finish(render_movie(skin, tmp_path / "smile.mp4", frames=(1, 2), size=(33, 32)))
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_full_disk_leaves_no_half_of_a_picture_or_film(blender, tmp_path):
+    """Blender says that it wrote them."""
+    pytest.importorskip("resource")
+    code = f"""
+import resource, signal
+from pathlib import Path
+import bpy, numpy as np
+from headshop.headshop_addon import movie, pictures
+from headshop.sim.errors import InputError
+
+folder, noise = Path({str(tmp_path)!r}), np.random.default_rng(0)
+frames = [folder / f"{{k:06d}}.png" for k in range(6)]
+for frame in frames:
+    pictures.write_picture(frame, noise.random((128, 128, 4)))
+movie.encode(frames, folder / "whole.mp4", (128, 128), 24)
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+resource.setrlimit(resource.RLIMIT_FSIZE, (20000, resource.getrlimit(resource.RLIMIT_FSIZE)[1]))
+for write in (
+    lambda: movie.encode(frames, folder / "half.mp4", (128, 128), 24),
+    lambda: pictures.write_picture(folder / "half.png", noise.random((256, 256, 4))),
+    lambda: pictures.write_picture(folder / "nowhere" / "half.png", noise.random((256, 256, 4))),
+):
+    try:
+        write()
+    except InputError as error:
+        assert "disk" in str(error)
+    else:
+        raise AssertionError
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
 
 
 def test_text_is_drawn_where_it_is_asked_for(bpy):
