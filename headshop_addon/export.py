@@ -4,6 +4,7 @@
 The copies live in a scene of their own for the moment of the export; the artist's scene stays as it was.
 """
 
+import re
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -45,11 +46,30 @@ def export_head(skin: bpy.types.Object, path) -> list[str]:
         with plain_materials(skin, scene, copies), quiet() as printed:
             try:
                 write_scene(temporary.resolve(), copies.values(), animated)
-            except RuntimeError as error:
+            except (RuntimeError, OSError) as error:
+                _refuse_full_disk(path, error, printed())
                 raise RuntimeError(f"{error} {printed()}") from error
         if not temporary.is_file():
             raise RuntimeError(f"Blender wrote no {path.suffix} file")
+        if path.suffix.lower() == ".usdc" and not _is_whole(temporary):
+            raise InputError(f"{path.name} cannot be written whole: is the disk full?")
         return [block.name for block in keys.key_blocks[1:]] if keys else []
+
+
+def _refuse_full_disk(path: Path, error: Exception, printed: str) -> None:
+    """Raise `InputError` if an exporter failed because it could not write; most say so in a traceback of theirs."""
+    causes = re.findall(r"(?:OSError|occurred writing file): (?:\[Errno \d+\] )?([^:\n]+)", f"{error}\n{printed}")
+    if isinstance(error, OSError):
+        causes.append(error.strerror or str(error))
+    if causes:
+        raise InputError(f"{path.name} cannot be written ({causes[-1].strip()}): is the disk full?") from error
+
+
+def _is_whole(path: Path) -> bool:
+    """Whether a USDC file has its table of contents, which is written last; of one that it lacks USD's exporter only prints."""
+    with path.open("rb") as file:
+        head = file.read(24)
+    return head[:8] == b"PXR-USDC" and 0 < int.from_bytes(head[16:], "little") < path.stat().st_size
 
 
 def _action_of(keys):

@@ -2,6 +2,8 @@
 """Engine-ready copies: exact names, no modifiers, the scene untouched; plain files that say what the head is."""
 
 import json
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -150,3 +152,24 @@ def test_a_performance_is_one_clip_that_moves_all_parts(bpy, skin, tmp_path, ref
     (size,) = struct.unpack("<I", data[12:16])
     clips = json.loads(data[20 : 20 + size])["animations"]
     assert [len(clip["channels"]) for clip in clips] == [3]
+
+
+@pytest.mark.parametrize("extension", [".glb", ".fbx", ".usdc", ".usdz"])
+def test_a_full_disk_is_a_sentence_and_leaves_no_half(blender, skin, bpy, tmp_path, extension):
+    """It was the exporters' traceback, and half a USDC file passed for a whole one."""
+    pytest.importorskip("resource")
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "head.blend"), copy=True)
+    code = """
+import resource, signal, sys
+from headshop.headshop_addon.command_line import main
+
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+resource.setrlimit(resource.RLIMIT_FSIZE, (400000, resource.getrlimit(resource.RLIMIT_FSIZE)[1]))
+sys.exit(main(sys.argv[1:]))
+"""
+    out = tmp_path / "made" / f"head{extension}"
+    command = [sys.executable, "-c", code, "export", str(tmp_path / "head.blend"), "-o", str(out)]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 2, done
+    assert "disk full" in done.stderr and done.stderr.count("\n") == 1 and len(done.stderr) < 200
+    assert not out.parent.exists()
