@@ -77,6 +77,20 @@ def test_bad_documents_say_what_to_do(document, word):
         performance_from(document)
 
 
+def test_a_channel_given_twice_is_refused(tmp_path):
+    path = tmp_path / "p.json"
+    path.write_text('{"format": "headshop-performance/1", "channels": {"jaw_open": [[0, 1]], "jaw_open": [[0, 0]]}}')
+    with pytest.raises(InputError, match="'jaw_open' twice"):
+        read_performance(path)
+
+
+@pytest.mark.parametrize("name", ["wind_x", "head_z", "gravity_y"])
+def test_a_storm_beyond_all_is_refused(name):
+    """It became numbers that are none, without a word."""
+    with pytest.raises(InputError, match=f"{name}.* within"):
+        performance_from({"format": FORMAT, "channels": {name: [[0, 0], [1, -1e30]]}})
+
+
 def test_bad_files(tmp_path):
     with pytest.raises(InputError, match="no performance file"):
         read_performance(tmp_path / "missing.json")

@@ -36,6 +36,34 @@ def test_what_is_no_number_is_named(model, pose):
         control(model, pose)
 
 
+@pytest.mark.parametrize("value", ["1", None, [0.5, 1.0], np.array([0.5, 1.0]), 10**400])
+def test_what_is_not_even_like_a_number_is_named(model, value):
+    for pose in (lambda: Pose({"zygomaticus_major_l": value}), lambda: Pose(jaw_open=value)):
+        with pytest.raises(InputError, match="finite number"):
+            control(model, pose())
+    with pytest.raises(InputError, match="'jaw_open' to"):
+        pose_from({"jaw_open": value})
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("zygomaticus_major", "did you mean 'zygomaticus_major_l'"),
+        ("Jaw_Open", "did you mean 'jaw_open'"),
+        ("jaw_open", "a control, not a muscle"),
+        ("smile", "correct the name or leave it out"),
+    ],
+)
+def test_a_name_that_is_nearly_right_is_told(model, name, words):
+    with pytest.raises(InputError, match=words):
+        control(model, Pose({name: 1.0}))
+
+
+def test_muscles_are_named():
+    with pytest.raises(InputError, match="dict of names"):
+        Pose(["zygomaticus_major_l"])
+
+
 def test_jaw_muscles_move_the_jaw(model):
     both = {"digastricus_l": 1.0, "digastricus_r": 1.0}
     opened = control(model, Pose(both)).jaw[0]

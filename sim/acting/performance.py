@@ -21,11 +21,13 @@ import numpy as np
 from ..anatomy.storage import write_atomically
 from ..errors import InputError
 from ..finite_numbers import is_number
+from ..json_keys import once
 from .outer import OUTER
 from .pose import Pose, pose_from
 
 FORMAT = "headshop-performance/1"
 _LONGEST = 36000.0  # seconds; a longer key time is a slip of the unit
+_FARTHEST = 1e6  # mm, mm/s, mm/s² or rad of the channels of the room; more is a slip, and ends in numbers that are none
 _SLOWEST, _FASTEST = 0.01, 1000.0  # frames a second that Blender's scenes can hold, and more than anybody needs
 
 
@@ -97,15 +99,18 @@ def read_performance(path) -> Performance:
 
     Raises
     ------
-    InputError : no such file, not JSON, another format, or a channel whose keys are not [time, value] in order of time.
+    InputError : no such file, not JSON, another format, a channel whose keys are not [time, value] in order of time, one that
+        is given twice, or one of the room that goes beyond all that heads meet.
     """
     path = Path(path)
     try:
-        document = json.loads(path.read_text(encoding="utf-8-sig"))
+        document = json.loads(path.read_text(encoding="utf-8-sig"), object_pairs_hook=once)
     except FileNotFoundError:
         raise InputError(f"There is no performance file {path}: check the path.") from None
     except OSError as error:
         raise InputError(f"{path} cannot be read ({error.strerror}): check the path and its permissions.") from None
+    except KeyError as error:
+        raise InputError(f"{path} gives {error.args[0]!r} twice: keep the right one.") from None
     except (ValueError, RecursionError):
         raise InputError(f"{path} is not a JSON file: export the performance again.") from None
     return performance_from(document, str(path))
@@ -139,6 +144,11 @@ def performance_from(document, where: str = "The performance") -> Performance:
             )
         if times[0] < 0 or times[-1] > _LONGEST:
             raise InputError(f"{where}: the times of channel {name!r} must lie between 0 and {_LONGEST:g} seconds.")
+        beyond = [v for _, v in keys if name in OUTER and abs(v) > _FARTHEST]
+        if beyond:
+            raise InputError(
+                f"{where}: channel {name!r} goes to {beyond[0]:g}: keep it within {_FARTHEST:,.0f}, in mm, seconds and radians."
+            )
         out[name] = tuple((float(t), float(v)) for t, v in keys)
     seed = document.get("seed", 0)
     if not isinstance(seed, int) or isinstance(seed, bool) or seed < 0:

@@ -1,6 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A pose as an artist says it (muscles, jaw, lids, gaze) and what it asks of a model."""
 
+import difflib
+import math
+import reprlib
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -44,9 +48,12 @@ SIDE_WORK = 0.6
 @dataclass(frozen=True)
 class Pose:
     """muscles: name -> 0..1; jaw_open 0..1, jaw_forward and jaw_side -1..1; blink 0..1; gaze -1..1 (left, up), of both eyes
-    and of each besides;    lips' sphincter centres -1..1 (back, forward); cheek_puff -1..1;
-    lips_together and tongue_out
-    0..1."""
+    and of each besides; lips' sphincter centres -1..1 (back, forward); cheek_puff -1..1; lips_together and tongue_out 0..1.
+
+    Raises
+    ------
+    InputError : the muscles are no dict.
+    """
 
     muscles: dict[str, float] = field(default_factory=dict)
     jaw_open: float = 0.0
@@ -66,15 +73,48 @@ class Pose:
     lips_together: float = 0.0
     tongue_out: float = 0.0
 
+    def __post_init__(self):
+        if not isinstance(self.muscles, Mapping):
+            raise InputError(
+                'A pose has its muscles as a dict of names and contractions, such as {"zygomaticus_major_l": 1.0}, '
+                f"not as {type(self.muscles).__name__}."
+            )
+
     def values(self) -> dict[str, float]:
         """Channel name -> value: every muscle named, and all of `CONTROLS`."""
         return {**self.muscles, **{name: getattr(self, name) for name in CONTROLS}}
 
 
 def pose_from(values: dict[str, float]) -> Pose:
-    """The pose with channels ``values`` (muscle and control names mixed)."""
+    """The pose with channels ``values`` (muscle and control names mixed).
+
+    Raises
+    ------
+    InputError : a value is not a finite number.
+    """
+    _require_numbers(values)
     muscles = {k: float(v) for k, v in values.items() if k not in CONTROLS}
     return Pose(muscles, **{k: float(v) for k, v in values.items() if k in CONTROLS})
+
+
+def _require_numbers(values: Mapping[str, float]) -> None:
+    for name, value in values.items():
+        try:
+            finite = math.isfinite(value)
+        except (TypeError, ValueError, OverflowError):  # text, an array, a whole number beyond every float
+            finite = False
+        if not finite:
+            raise InputError(f"The pose sets {name!r} to {reprlib.repr(value)}: give a finite number.")
+
+
+def _no_muscle(name, known) -> str:
+    """What to say of a muscle that is not among the ``known`` ones."""
+    if name in CONTROLS:
+        return f"{name!r} is a control, not a muscle: write Pose({name}=...), or pose_from with muscles and controls mixed."
+    sides = [side for side in (f"{name}_l", f"{name}_r") if side in known]
+    near = sides or difflib.get_close_matches(str(name).lower(), [*known, *CONTROLS], n=2, cutoff=0.7)
+    meant = f" (did you mean {' or '.join(map(repr, near))}?)" if near else ""
+    return f"The pose uses the muscle {name!r}, which this head does not have: correct the name{meant} or leave it out."
 
 
 def combined(one: Pose, other: Pose) -> Pose:
@@ -92,16 +132,12 @@ def control(model: Model, pose: Pose) -> Control:
     ------
     InputError : the pose names a muscle that the model does not have, or a value is not a finite number.
     """
-    for name, value in pose.values().items():
-        if not np.isfinite(value):
-            raise InputError(f"The pose sets {name!r} to {value}: give a finite number.")
+    _require_numbers(pose.values())
     index = {name: k for k, name in enumerate(model.muscle_names)}
     activation = np.zeros(len(index))
     for name, value in pose.muscles.items():
         if name not in index:
-            raise InputError(
-                f"The pose uses the muscle {name!r}, which this head does not have: correct the name or leave it out."
-            )
+            raise InputError(_no_muscle(name, index))
         activation[index[name]] = np.clip(value, 0.0, 1.0)
 
     def of(base, side):

@@ -18,6 +18,7 @@ from ..anatomy.landmark_names import LABELS, SKIN
 from ..anatomy.storage import write_atomically
 from ..errors import InputError
 from ..finite_numbers import is_number
+from ..json_keys import once
 from ..landmarks.sure import SURE
 from .thin_plate_spline import flatness
 
@@ -69,15 +70,6 @@ def _position(path, name, value) -> np.ndarray:
     return np.array(value, dtype=float)
 
 
-def _once(pairs):
-    """JSON object hook that refuses a key given twice."""
-    out = dict(pairs)
-    if len(out) != len(pairs):
-        keys = [k for k, _ in pairs]
-        raise KeyError(next(k for k in keys if keys.count(k) > 1))
-    return out
-
-
 def read_landmarks(path) -> dict[str, np.ndarray]:
     """Landmark name -> (3,) mm of a landmark file, see `read_landmark_file`."""
     return read_landmark_file(path).positions
@@ -101,7 +93,7 @@ def read_landmark_file(path) -> LandmarkFile:
         why = error.strerror if isinstance(error, OSError) and error.strerror else "it is not a text file"
         raise InputError(f"The landmark file {path} cannot be read ({why}): choose a JSON landmark file.") from None
     try:
-        document = json.loads(text, object_pairs_hook=_once)
+        document = json.loads(text, object_pairs_hook=once)
     except KeyError as error:
         raise InputError(f'{path} gives "{error.args[0]}" twice: keep the right one.') from None
     except (ValueError, RecursionError) as error:
