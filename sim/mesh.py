@@ -5,6 +5,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from .errors import InputError
+
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
@@ -50,10 +52,18 @@ class Mesh:
         return out
 
     def moved(self, vertices: np.ndarray) -> "Mesh":
-        """The same mesh with other vertex positions (n, 3)."""
+        """The same mesh with other vertex positions (n, 3).
+
+        Raises
+        ------
+        InputError : not as many positions as vertices.
+        """
         vertices = np.asarray(vertices, dtype=np.float64)
         if vertices.shape != self.vertices.shape:
-            raise ValueError(f"a mesh of {len(self.vertices)} vertices cannot take positions of shape {vertices.shape}")
+            shape = self.vertices.shape
+            raise InputError(
+                f"A mesh of {shape[0]} vertices cannot take positions of shape {vertices.shape}: give {shape}."
+            )
         return replace(self, vertices=vertices)
 
     def transformed(self, matrix: np.ndarray) -> "Mesh":

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Every model by name: one interface, the neutral face exactly the scan, the same smile up and out."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -51,6 +53,35 @@ def test_the_jaw_takes_the_chin_along(acting, reference):
         row = marks.names.index(name)
         moved = marks.weights[row] @ (posed["skin"] - reference.skin.vertices)[marks.corners[row]]
         assert low < moved[2] < high, name
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"activations": np.zeros(3)},
+        {"activations": np.full(69, np.nan)},
+        {"jaw": np.zeros(2)},
+        {"lids": [[0, 0], [0, "shut"]]},
+        {"cheeks": np.inf},
+    ],
+)
+def test_a_control_that_does_not_fit_is_refused(acting, change):
+    """Some of it was taken for no contraction at all."""
+    found, model = acting
+    with pytest.raises(InputError, match=next(iter(change))):
+        found.solve(model, replace(control(model, Pose()), **change), max_iterations=2)
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_a_head_that_is_none_is_refused(model, reference):
+    """In metres it became a model that did not move."""
+    small = reference.with_vertices({part: points / 1000 for part, points in reference.vertices().items()})
+    with pytest.raises(InputError, match="millimetres"):
+        model_named(model).build(small)
+    torn = reference.skin.vertices.copy()
+    torn[0] = np.nan
+    with pytest.raises(InputError, match="skin has vertices"):
+        model_named(model).build(reference.with_vertices({"skin": torn}))
 
 
 def test_the_command_line_names_the_models(tmp_path, capsys):

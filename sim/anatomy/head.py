@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..errors import InputError
 from ..mesh import Mesh, surface_points
 from . import landmark_names
 
@@ -176,7 +177,15 @@ class Head:
         return self.skull_landmarks.on(self.vertices())
 
     def with_vertices(self, vertices_of: dict[str, np.ndarray]) -> "Head":
-        """The head with other vertex positions for the parts named."""
+        """The head with other vertex positions for the parts named.
+
+        Raises
+        ------
+        InputError : it has no such part, or that has more or fewer vertices.
+        """
+        for name in vertices_of:
+            if name not in self.parts:
+                raise InputError(f"The head has no part {name!r}: its parts are {', '.join(self.parts)}.")
         parts = {n: m.moved(vertices_of[n]) if n in vertices_of else m for n, m in self.parts.items()}
         return replace(self, parts=parts)
 

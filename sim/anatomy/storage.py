@@ -5,16 +5,20 @@ The document holds all of a head that is not a mesh: landmarks, feature mesh, mu
 which version wrote it.
 """
 
+import errno
 import io
 import json
 import os
 import tempfile
+import zlib
 from functools import cache
 from pathlib import Path
+from zipfile import BadZipFile
 
 import numpy as np
 
 from ..errors import InputError
+from ..file_bytes import file_bytes
 from ..mesh import Mesh
 from .head import Eye, Head, Jaw, Muscle, SurfacePoints
 
@@ -143,8 +147,22 @@ def head_from_document(parts: dict[str, Mesh], groups: dict[str, np.ndarray], do
 
 
 def write_atomically(path, data: bytes) -> None:
-    """Write under a temporary name beside ``path``, then rename; nothing is left behind on failure."""
+    """Write under a temporary name beside ``path``, then rename; nothing is left behind on failure.
+
+    Raises
+    ------
+    InputError : it cannot be written there.
+    """
     path = Path(path)
+    try:
+        _write_beside(path, data)
+    except OSError as error:
+        full = error.errno in (errno.ENOSPC, errno.EFBIG, getattr(errno, "EDQUOT", None))
+        advice = "is the disk full?" if full else "choose a folder you may write to."
+        raise InputError(f"{path} cannot be written ({error.strerror}): {advice}") from error
+
+
+def _write_beside(path: Path, data: bytes) -> None:
     handle, temporary = tempfile.mkstemp(prefix="." + path.name + ".", dir=path.parent)
     try:
         with os.fdopen(handle, "wb") as stream:
@@ -157,7 +175,12 @@ def write_atomically(path, data: bytes) -> None:
 
 
 def save_head(head: Head, path) -> None:
-    """Write ``head`` to an ``.npz`` file (same head, same bytes)."""
+    """Write ``head`` to an ``.npz`` file (same head, same bytes).
+
+    Raises
+    ------
+    InputError : it cannot be written there.
+    """
     arrays: dict[str, np.ndarray] = {"anatomy": np.array(json.dumps(anatomy_document(head)))}
     for name, mesh in head.parts.items():
         for field in ("vertices", "faces", "uv", "material"):
@@ -184,9 +207,19 @@ def reference_head() -> Head:
 
 
 def load_head(path=REFERENCE) -> Head:
-    """Read a head written by `save_head`; the reference head by default."""
-    with np.load(path) as file:
-        arrays = {key: file[key] for key in file.files}
+    """Read a head written by `save_head`; the reference head by default.
+
+    Raises
+    ------
+    InputError : it cannot be read, is no such file or not all of one, or was written by another format version.
+    """
+    data = file_bytes(path)
+    try:
+        with np.load(io.BytesIO(data)) as file:
+            arrays = {key: file[key] for key in file.files}
+        document = json.loads(str(arrays["anatomy"]))
+    except (ValueError, KeyError, TypeError, AttributeError, EOFError, OSError, BadZipFile, zlib.error) as error:
+        raise InputError(f"{path} is no head that save_head wrote, or not all of one: save it again.") from error
     parts: dict[str, dict] = {}
     groups = {}
     for key, value in arrays.items():
@@ -197,4 +230,4 @@ def load_head(path=REFERENCE) -> Head:
         elif kind == "group":
             groups[rest] = value
     meshes = {name: Mesh(**fields) for name, fields in parts.items()}
-    return head_from_document(meshes, groups, json.loads(str(arrays["anatomy"])))
+    return head_from_document(meshes, groups, document)

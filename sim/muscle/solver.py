@@ -52,7 +52,7 @@ def look(model: Model, control: Control) -> tuple[State, bool]:
 
 def displaced(model: Model, control: Control) -> np.ndarray:
     """(n, 3) mm, the skin in the pose."""
-    tension = np.clip(np.asarray(control.activations, float), 0, 1)
+    tension = control.contractions(len(model.muscle_names))
     rotation, translation = jaw_transform(model.jaw, *control.jaw)
     closed = not np.any(control.jaw)
     pivot = (model.jaw.condyle_l + model.jaw.condyle_r) / 2

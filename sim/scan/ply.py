@@ -98,10 +98,7 @@ def write_ply(path, mesh: Mesh, encoding: str = "binary_little_endian", comments
         for k, name in enumerate(("red", "green", "blue")):
             vertices[name] = rgb[:, k]
     body = _ascii_text(vertices, mesh.faces) if encoding == "ascii" else _binary(vertices, mesh.faces, order)
-    try:
-        write_atomically(path, "\n".join(header).encode("ascii", "replace") + body)
-    except OSError as error:
-        raise InputError(f"{path} cannot be written ({error.strerror}): choose a folder you may write to.") from error
+    write_atomically(path, "\n".join(header).encode("ascii", "replace") + body)
 
 
 def _binary(vertices, faces, order) -> bytes:

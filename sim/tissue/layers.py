@@ -10,6 +10,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..anatomy.head import Head
+from ..errors import InputError
 from ..mesh import vertex_areas, vertex_normals
 from .geometry import Surface, cotangent_stiffness, short_diagonals, smoothed
 from .gingiva import ATTACHED, attached
@@ -33,6 +34,8 @@ _SOFT = {
 #: All else without bone within reach (the floor of the mouth, the neck under the jaw).
 _OTHER = (3.5, 0.5, 0.4)
 _REACH = 24.0
+#: mm between which a head's skin is from end to end, with neck and bust or without.
+_SIZES = (50.0, 2000.0)
 
 
 def _sides(groups, name):
@@ -41,8 +44,23 @@ def _sides(groups, name):
     return np.clip(np.sum(found, axis=0), 0, 1) if found else 0.0
 
 
+def _require_millimetres(head: Head) -> None:
+    for name, mesh in head.parts.items():
+        if not np.isfinite(mesh.vertices).all():
+            raise InputError(f"The head's {name} has vertices in places that are no finite numbers: correct them.")
+    size = float(np.ptp(head.skin.vertices, axis=0).max(initial=0.0))
+    if not _SIZES[0] < size < _SIZES[1]:
+        raise InputError(f"The head's skin is {size:.3g} mm from end to end, which no head is: give it in millimetres.")
+
+
 def build_layers(head: Head, parameters: Parameters) -> Layers:
-    """The columns of ``head``; the rest position of every node."""
+    """The columns of ``head``; the rest position of every node.
+
+    Raises
+    ------
+    InputError : a part of the head is in places that are none, or the head is not in millimetres.
+    """
+    _require_millimetres(head)
     skin = head.skin
     v, tri = skin.vertices, short_diagonals(skin.vertices, skin.faces)
     n = len(v)

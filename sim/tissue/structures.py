@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..anatomy.head import Eye, Jaw
+from ..errors import InputError
 from .parameters import Parameters
 from .surroundings import Surroundings
 
@@ -206,6 +207,13 @@ class State:
         return self.positions[: len(self.positions) // 3]
 
 
+#: Shapes of what a `Control` asks for; None: one for each muscle.
+_ASKED = {
+    **{"activations": (None,), "jaw": (3,), "lids": (2, 2), "gaze": (2,), "lips": (2,), "eyes": (2, 2)},
+    **dict.fromkeys(("cheeks", "seal", "tongue"), ()),
+}
+
+
 @dataclass(frozen=True, eq=False)
 class Control:
     """What is asked of the face.
@@ -221,6 +229,10 @@ class Control:
     seal : 0..1, how firmly the lips are held together where they touch at rest
     cheeks : -1..1, pressure of the air in the mouth: 1 puffed, -1 sucked in
     around : gravity, motion of the head, wind
+
+    Raises
+    ------
+    InputError : one of them has another shape, or is not a finite number.
     """
 
     activations: np.ndarray
@@ -233,6 +245,32 @@ class Control:
     tongue: float = 0.0
     eyes: np.ndarray = field(default_factory=lambda: np.zeros((2, 2)))
     around: Surroundings = field(default_factory=Surroundings)
+
+    def __post_init__(self):
+        for name, shape in _ASKED.items():
+            try:
+                value = np.asarray(getattr(self, name), dtype=float)
+            except (TypeError, ValueError):
+                value = np.full(shape, np.nan)
+            if value.ndim != len(shape) or (None not in shape and value.shape != shape) or not np.isfinite(value).all():
+                count = "one" if not shape else "one for each muscle" if None in shape else " by ".join(map(str, shape))
+                raise InputError(
+                    f"The control's {name} must be finite numbers, {count}: let pose.control make it of a pose."
+                )
+            if shape:
+                object.__setattr__(self, name, value)
+
+    def contractions(self, count: int) -> np.ndarray:
+        """(k,) 0..1 of the ``count`` muscles of a model.
+
+        Raises
+        ------
+        InputError : it was made for a head with more or fewer.
+        """
+        if len(self.activations) != count:
+            given = len(self.activations)
+            raise InputError(f"The control has {given} activations and the model {count} muscles: give one for each.")
+        return np.clip(self.activations, 0, 1)
 
     def gaze_of(self, side: str) -> np.ndarray:
         """(2,) rad to the subject's left and up, of the eye on ``side`` ("l" or "r")."""

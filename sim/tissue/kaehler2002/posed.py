@@ -114,7 +114,7 @@ def pose_of(model: Model, control: Control) -> Pose:
     offset = offset + at.share[:, None] * (offset @ rotation.T - offset)
     fibres = model.fibres.points
     if model.axes.count:
-        contraction = np.clip(np.asarray(control.activations, float)[model.axes.muscles], 0, 1)
+        contraction = control.contractions(len(model.muscle_names))[model.axes.muscles]
         before, fibres, turned, ratio = muscle_shapes(model, rotation, translation, contraction, control.lips)
         foot = foot + at.weights @ (fibres - before)
         offset = turned_by(at.weights @ turned, offset)

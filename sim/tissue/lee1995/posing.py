@@ -48,7 +48,7 @@ def applied_forces(model: LeeModel, control: Control, rotation: np.ndarray) -> n
     """(3 n, 3) f of 3.8: the muscles at their activations, and the air in the cheeks."""
     m = model.muscles
     n = model.count
-    activation = np.clip(np.asarray(control.activations, float), 0, 1)
+    activation = control.contractions(len(model.muscle_names))
     size = activation[m.owner] * m.strength[m.owner]
     pull = m.force + m.tie[:, None] * (m.force @ rotation.T - m.force)  # roots in the jaw turn with it
     pull = pull + np.append(np.clip(control.lips, -1, 1), 0.0)[m.lip][:, None] * m.forward
