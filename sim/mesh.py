@@ -81,6 +81,24 @@ class Mesh:
         return replace(out, faces=np.take_along_axis(self.faces, order, axis=1), uv=uv)
 
 
+def require_surface(scan: Mesh) -> None:
+    """Raise `InputError` unless ``scan`` has faces, of vertices that it has, in finite places."""
+    if not isinstance(scan, Mesh):
+        raise InputError(f"The scan is given as {type(scan).__name__}: give a Mesh, such as Mesh.from_triangles makes.")
+    count, corners = len(scan.vertices), scan.faces
+    if not count or not len(corners):
+        raise InputError("The scan has no faces: give a surface; scan.clean.clean_scan makes one of points.")
+    if corners[:, :3].min() < 0 or corners.max() >= count:
+        wrong = corners.max() if corners.max() >= count else corners[:, :3].min()
+        raise InputError(
+            f"A face of the scan has the vertex {wrong}, and there are {count}, from 0 on: correct its faces."
+        )
+    if not np.isfinite(scan.vertices).all():
+        raise InputError(
+            "The scan has vertices in places that are no finite numbers: scan.clean.clean_scan leaves them out."
+        )
+
+
 def vertex_normals(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """(n, 3) unit normals, area-weighted; zero where a vertex has no triangle."""
     planes = vertices.T.copy()

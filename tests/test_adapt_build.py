@@ -20,6 +20,7 @@ from headshop.sim.anatomy.eyeball import BALL
 from headshop.sim.anatomy.inside import winding_number
 from headshop.sim.anatomy.landmark_names import mirrored
 from headshop.sim.errors import InputError
+from headshop.sim.landmarks.find import find_landmarks
 from headshop.sim.mesh import Mesh, edges
 from headshop.sim.mesh_piercing import self_piercings
 from headshop.sim.mesh_subdivision import drawn, subdivision
@@ -274,6 +275,34 @@ def test_bad_landmarks_are_refused_in_one_sentence(reference, subject):
         with pytest.raises(InputError, match=word) as refusal:
             finish(build_head(reference, scan, changed))
         assert "\n" not in str(refusal.value) and str(refusal.value).endswith(".")
+
+
+def test_what_is_no_scan_and_no_landmark_is_refused_in_one_sentence(reference, subject):
+    """NumPy complained of it, and a name that is none was left out without a word."""
+    scan, marks, _ = subject
+    torn, wrong, before = scan.vertices.copy(), scan.triangles.copy(), scan.triangles.copy()
+    torn[7], wrong[0, 0], before[0, 0] = np.nan, len(torn) + 5, -3
+    no_faces = np.zeros((0, 3))
+    for mesh, word in (
+        (Mesh.from_triangles(no_faces, no_faces), "no faces"),
+        (Mesh.from_triangles(scan.vertices, no_faces), "no faces"),
+        (Mesh.from_triangles(torn, scan.triangles), "no finite numbers"),
+        (Mesh.from_triangles(scan.vertices, wrong), f"vertex {len(torn) + 5}"),
+        (Mesh.from_triangles(scan.vertices, before), "vertex -3"),
+        ((scan.vertices, scan.triangles), "tuple: give a Mesh"),
+    ):
+        with pytest.raises(InputError, match=word):
+            finish(build_head(reference, mesh, marks))
+        with pytest.raises(InputError, match=word):
+            finish(find_landmarks(mesh))
+    for place in (None, "there", [1, 2], [np.nan, 0, 0], np.zeros((1, 3))):
+        with pytest.raises(InputError, match='"prn" is not three finite numbers'):
+            finish(build_head(reference, scan, marks | {"prn": place}))
+    with pytest.raises(InputError, match='unknown landmark "prm"'):
+        finish(build_head(reference, scan, marks | {"prm": [0, 0, 0]}))
+    for detail in (-3, "big", 1e3):
+        with pytest.raises(InputError, match="whole number from 0"):
+            finish(build_head(reference, scan, marks, detail=detail))
 
 
 @pytest.mark.parametrize("name", ["fran_cyberware", "lps_infinite"])

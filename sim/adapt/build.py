@@ -9,9 +9,9 @@ import numpy as np
 from ..anatomy.head import Head
 from ..anatomy.landmark_names import SKIN
 from ..detail.detail_map import DetailMaps
-from ..detail.maps import SIZE, detail_maps
+from ..detail.maps import SIZE, detail_maps, require_size
 from ..errors import InputError
-from ..mesh import Mesh
+from ..mesh import Mesh, require_surface
 from ..mesh_subdivision import drawn, smoother
 from ..progress import Progress, Work, portion
 from ..relax.choice import kept_open, neutral_of, require_choice, smiles_closed
@@ -20,7 +20,7 @@ from .closest import Surface
 from .fit_sentence import FITTED, MOST, SMILES_CLOSED, doubts, fit_sentence, fitted_shares, invented
 from .follow import follow
 from .gate import check_against_scan, check_arrangement, check_likeness, check_on_face, check_on_surface, doubted
-from .landmarks import require_usable
+from .landmarks import usable
 from .rest import BONES, rest_of
 from .scan_surface import near_head, to_leave_out, without_cuts, without_jumps
 from .skin_fit import SkinFit, fit_skin
@@ -80,13 +80,15 @@ def build_head(
 
     Raises
     ------
-    InputError : the landmarks are too few, do not form a face, or do not belong to this scan; or no good fit was found.
+    InputError : the scan is no surface; the landmarks are no places, too few, do not form a face, or do not belong to this
+        scan; or no good fit was found.
     """
     from ..landmarks.first_look import first_look
 
-    given = {n: np.asarray(p, dtype=float) for n, p in landmarks.items() if n in SKIN}
-    require_usable(given, "The landmark set")
+    require_surface(scan)
+    given = usable(landmarks, "The landmark set")
     require_choice(relax)
+    require_size(detail)
     out = to_leave_out(leave_out)
     yield Progress(0.0, "Looking at the scan")
     whole = near_head(reference, scan, given)

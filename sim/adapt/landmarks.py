@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from ..anatomy import landmark_names
-from ..anatomy.landmark_names import LABELS, SKIN
+from ..anatomy.landmark_names import LABELS, SKIN, SKULL
 from ..anatomy.storage import write_atomically
 from ..errors import InputError
 from ..finite_numbers import is_number
@@ -137,6 +137,27 @@ def _found(document) -> dict[str, float]:
     same = {n for n in given if not isinstance(places, dict) or places.get(n) == given[n]}
     sure = {n: float(c) for n, c in confidence.items() if n in same and is_number(c)}
     return sure | {n: 0.0 for n in mid_air if isinstance(n, str) and n in same}
+
+
+def usable(landmarks: dict[str, np.ndarray], source: str) -> dict[str, np.ndarray]:
+    """Name -> (3,) mm of the skin's landmarks that a program gives, the skull's left out; raises `InputError` where
+    `require_usable` does, and for names and places that are none."""
+    given = {}
+    for name, place in landmarks.items():
+        if name in SKULL and name not in SKIN:
+            continue
+        if name not in SKIN:
+            raise InputError(f'{source} names an unknown landmark "{name}"{_suggestion(str(name))}.')
+        try:
+            given[name] = np.asarray(place, dtype=float)
+        except (TypeError, ValueError):
+            given[name] = np.full(3, np.nan)
+        if given[name].shape != (3,) or not np.isfinite(given[name]).all():
+            raise InputError(
+                f'{source}: landmark "{name}" is not three finite numbers [x, y, z]: give its place in mm.'
+            )
+    require_usable(given, source)
+    return given
 
 
 def require_usable(positions: dict[str, np.ndarray], source: str = "The landmark file") -> None:

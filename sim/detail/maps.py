@@ -5,6 +5,7 @@ import numpy as np
 from scipy.ndimage import distance_transform_edt, gaussian_filter, zoom
 
 from ..adapt.closest import Surface
+from ..errors import InputError
 from ..mesh import Mesh
 from ..progress import Progress, Work, portion
 from .chart import Chart, Texels, chart_of, texels
@@ -14,7 +15,16 @@ from .height import heights
 #: Texels along a side: half a millimetre each on a head.
 SIZE = 1024
 FADE = 8.0  # mm over which detail runs out beside places without data
+_LARGEST = 8192  # texels along a side: more would not fit the memory of an ordinary machine
 STEEPEST = 1.2  # the most it tilts: tangent of an angle
+
+
+def require_size(size: int) -> None:
+    """Raise `InputError` unless ``size`` is one of texels along a side, or 0 for no maps."""
+    if not isinstance(size, (int, np.integer)) or not 0 <= size <= _LARGEST:
+        raise InputError(
+            f"Detail maps of {size!r} pixels cannot be made: give a whole number from 0 (none) to {_LARGEST}."
+        )
 
 
 def detail_maps(skin: Mesh, target: Surface, inner: np.ndarray, size: int = SIZE) -> Work:

@@ -9,7 +9,7 @@ from ..anatomy.head import Head
 from ..anatomy.storage import reference_head
 from ..blas import on_one_thread
 from ..cylindrical.second_opinion import weighed
-from ..mesh import Mesh
+from ..mesh import Mesh, require_surface
 from ..progress import Progress, Work, portion
 from ..scan.depth_jumps import depth_jumps
 from ..scan.units import USUAL
@@ -89,13 +89,14 @@ def find_landmarks(
 
     Raises
     ------
-    InputError : there is no face in it.
+    InputError : it is no surface, or there is no face in it.
     """
     return on_one_thread(_finding(mesh, reference, unit_scales, any_size, usual))
 
 
 def _finding(mesh: Mesh, reference: Head | None, unit_scales, any_size: bool, usual) -> Work:
     """`find_landmarks`."""
+    require_surface(mesh)
     yield Progress(0.0, LOOKING)
     reference = reference or reference_head()
     space = shape_space(reference)
