@@ -22,6 +22,10 @@ class Mesh:
     colour : (n, 3) float32 or None, sRGB colour per vertex, 0..1 (scans)
     normals : (n, 3) float32 or None, which way the surface faces at points that have no faces (scans)
     pictures : (h, w, 3) uint8 each, sRGB, first row at the bottom: what faces of that material show; None: nothing (scans)
+
+    Raises
+    ------
+    InputError : vertices or faces have another shape; lists and numbers of other kinds are taken.
     """
 
     vertices: np.ndarray
@@ -32,13 +36,17 @@ class Mesh:
     normals: np.ndarray | None = None
     pictures: tuple[np.ndarray | None, ...] = ()
 
+    def __post_init__(self):
+        object.__setattr__(self, "vertices", _table(self.vertices, "vertices", 3, np.float64))
+        object.__setattr__(self, "faces", _table(self.faces, "faces", 4, np.int32))
+
     @classmethod
     def from_triangles(cls, vertices, triangles, **more) -> "Mesh":
-        """A mesh of triangles (m, 3)."""
-        triangles = np.asarray(triangles, dtype=np.int32).reshape(-1, 3)
+        """A mesh of triangles (m, 3). Raises `InputError` where they have another shape."""
+        triangles = _table(triangles, "triangles", 3, np.int32)
         faces = np.full((len(triangles), 4), -1, dtype=np.int32)
         faces[:, :3] = triangles
-        return cls(np.asarray(vertices, dtype=np.float64).reshape(-1, 3), faces, **more)
+        return cls(vertices, faces, **more)
 
     @property
     def triangles(self) -> np.ndarray:
@@ -79,6 +87,19 @@ class Mesh:
         order = np.where(self.faces[:, 3:] >= 0, [0, 3, 2, 1], [0, 2, 1, 3])
         uv = None if self.uv is None else np.take_along_axis(self.uv, order[:, :, None], axis=1)
         return replace(out, faces=np.take_along_axis(self.faces, order, axis=1), uv=uv)
+
+
+def _table(values, name: str, columns: int, kind) -> np.ndarray:
+    """(k, columns) of ``values``, which may come one after another too."""
+    try:
+        table = np.asarray(values, dtype=kind)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"The {name} of a mesh are no table of numbers ({error}): give (n, {columns}).") from None
+    if table.ndim == 2 and table.shape[1] == columns:
+        return table  # itself, where it is one already
+    if table.size and (table.ndim != 1 or table.size % columns):
+        raise InputError(f"The {name} of a mesh have the shape {table.shape}: give (n, {columns}).")
+    return table.reshape(-1, columns)
 
 
 def require_surface(scan: Mesh) -> None:

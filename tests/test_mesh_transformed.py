@@ -4,6 +4,7 @@
 import numpy as np
 import pytest
 
+from headshop.sim.errors import InputError
 from headshop.sim.mesh import Mesh, vertex_normals
 
 
@@ -43,3 +44,24 @@ def test_corners_keep_their_places_on_the_picture(mixed, matrix):
         used = faces >= 0
         np.testing.assert_array_equal(uv[used], mixed.vertices[faces[used], :2].astype(np.float32))
     assert mixed.transformed(np.eye(3)).faces is mixed.faces
+
+
+def test_a_mesh_of_lists_and_other_numbers_is_one_of_arrays():
+    """In float32 it could not be cleaned, and three quads that were taken for four triangles were scrambled without a word."""
+    points, quads = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2, 3]]
+    for mesh in (
+        Mesh(points, quads),
+        Mesh(np.array(points, np.float32), np.array(quads, np.int64)),
+        Mesh(np.ravel(points), np.ravel(quads)),
+    ):
+        assert (mesh.vertices.dtype, mesh.vertices.shape) == (np.float64, (4, 3))
+        assert (mesh.faces.dtype, mesh.faces.shape) == (np.int32, (1, 4))
+        np.testing.assert_array_equal(mesh.triangles, [[0, 1, 2], [0, 2, 3]])
+    for bad, word in (
+        (lambda: Mesh.from_triangles(points, quads * 3), r"triangles .* shape \(3, 4\): give \(n, 3\)"),
+        (lambda: Mesh.from_triangles(np.zeros((5, 2)), [[0, 1, 2]]), "vertices .* shape"),
+        (lambda: Mesh(points, [[0, 1, "two", 3]]), "faces .* no table of numbers"),
+        (lambda: Mesh(None, quads), "vertices"),
+    ):
+        with pytest.raises(InputError, match=word):
+            bad()
