@@ -48,7 +48,8 @@ class Outputs:
         return False
 
     def file(self, path, beside: str | None = None) -> Path:
-        """A path to write to instead of ``path``, which it becomes in the end: same name, in a hidden folder beside it.
+        """A path to write to instead of ``path``, which it becomes in the end: same name, in a hidden folder beside it. Where
+        ``path`` is a link, what it leads to is written, unless there is a folder ``beside``, to which it must lie near.
 
         ``beside`` is the name of a folder that may be made next to it. What is in it goes into the folder of that name
         next to ``path``, before ``path`` appears, and replaces files of the same names; others there stay.
@@ -61,7 +62,8 @@ class Outputs:
         if path.is_dir():
             raise InputError(f"{path} is a folder: give the name of a file to write.")
         self._spare_inputs(path)
-        scratch = self._scratch_beside(path)
+        final = Path(os.path.realpath(path)) if beside is None and path.is_symlink() else path
+        scratch = self._scratch_beside(final)
         if path.exists() and not os.access(path, os.W_OK):
             raise InputError(f"{path} is write-protected: give another output.")
         if beside is not None:
@@ -71,7 +73,7 @@ class Outputs:
                     f"{folder} must be a folder that can be written to, for {path.name}: rename the output."
                 )
             self._folders.append((scratch / beside, folder))
-        self._renames.append((scratch / path.name, path))
+        self._renames.append((scratch / path.name, final))
         return scratch / path.name
 
     def folder(self, path, names) -> Path:

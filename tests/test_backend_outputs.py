@@ -72,6 +72,20 @@ def test_inputs_are_spared(tmp_path):
     assert given.read_text() == "picked by hand"
 
 
+def test_a_link_stays_one(tmp_path):
+    """A head that is kept elsewhere was not baked: the link to it became a file."""
+    (tmp_path / "store").mkdir()
+    (tmp_path / "store" / "head.blend").write_text("old")
+    for name, to in (("link.blend", "store/head.blend"), ("dangling.blend", "later/head.blend")):
+        (tmp_path / name).symlink_to(tmp_path / to)
+        with Outputs() as outputs:
+            file = outputs.file(tmp_path / name)
+            assert file.name == name
+            file.write_text("new")
+        assert (tmp_path / name).is_symlink() and (tmp_path / to).read_text() == "new"
+        assert [p.name for p in (tmp_path / to).parent.iterdir()] == ["head.blend"]
+
+
 def test_a_file_and_a_folder_of_one_name_are_refused(tmp_path):
     with pytest.raises(InputError, match="head is a file"), Outputs() as outputs:
         outputs.file(tmp_path / "head")
