@@ -132,5 +132,6 @@ def summary(made: dict) -> str:
         said.append(f"{len(made['shapes'])} shapes ({settled} at rest, deepest penetration {worst:.2f} mm)")
     if made.get("performance"):
         acting = made["performance"]
-        said.append(f"{acting['frames']} frames in {acting['keys'].get('skin', 0)} shape keys of the skin")
+        frames, keys = acting["frames"], acting["keys"].get("skin", 0)
+        said.append(f"{frames} frame{'s' * (frames != 1)} in {keys} shape key{'s' * (keys != 1)} of the skin")
     return ", ".join(said)

@@ -15,7 +15,8 @@ class Mesh:
     Attributes
     ----------
     vertices : (n, 3) float64, mm
-    faces : (m, 4) int32, corners counter-clockwise seen from outside; a triangle has -1 in the last column
+    faces : (m, 4) int32, corners counter-clockwise seen from outside; a triangle has -1 in the last column, which may be
+        left out where all are
     uv : (m, 4, 2) float32 or None, texture coordinates per face corner
     material : (m,) int16 or None, index into the part's material names (`headshop.sim.anatomy.head.MATERIALS`), or into
         the ``pictures`` of a scan
@@ -97,6 +98,8 @@ def _table(values, name: str, columns: int, kind) -> np.ndarray:
         raise InputError(f"The {name} of a mesh are no table of numbers ({error}): give (n, {columns}).") from None
     if table.ndim == 2 and table.shape[1] == columns:
         return table  # itself, where it is one already
+    if name == "faces" and table.ndim == 2 and table.shape[1] == 3:
+        return np.pad(table, ((0, 0), (0, 1)), constant_values=-1)
     if table.size and (table.ndim != 1 or table.size % columns):
         raise InputError(f"The {name} of a mesh have the shape {table.shape}: give (n, {columns}).")
     return table.reshape(-1, columns)

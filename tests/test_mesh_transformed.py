@@ -57,11 +57,13 @@ def test_a_mesh_of_lists_and_other_numbers_is_one_of_arrays():
         assert (mesh.vertices.dtype, mesh.vertices.shape) == (np.float64, (4, 3))
         assert (mesh.faces.dtype, mesh.faces.shape) == (np.int32, (1, 4))
         np.testing.assert_array_equal(mesh.triangles, [[0, 1, 2], [0, 2, 3]])
+    np.testing.assert_array_equal(Mesh(points, [[0, 1, 2]]).faces, [[0, 1, 2, -1]])
     for bad, word in (
         (lambda: Mesh.from_triangles(points, quads * 3), r"triangles .* shape \(3, 4\): give \(n, 3\)"),
         (lambda: Mesh.from_triangles(np.zeros((5, 2)), [[0, 1, 2]]), "vertices .* shape"),
         (lambda: Mesh(points, [[0, 1, "two", 3]]), "faces .* no table of numbers"),
         (lambda: Mesh(None, quads), "vertices"),
+        (lambda: Mesh(points, [[0, 1, 2], [0, 1]]), "faces"),
     ):
         with pytest.raises(InputError, match=word):
             bad()
