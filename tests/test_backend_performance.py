@@ -230,3 +230,9 @@ for name in ("Fran Skin", "Fran Mandible"):
     moved.append(np.linalg.norm(at[1] - at[0], axis=1).max())
 print(*moved)
 """
+
+
+def test_one_of_a_kind_is_said_to_be_one(bpy):
+    from headshop.headshop_addon import baking
+
+    assert baking.summary({"performance": {"frames": 1, "keys": {"skin": 1}}}) == "1 frame in 1 shape key of the skin"
