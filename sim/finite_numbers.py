@@ -3,6 +3,8 @@
 
 import math
 
+from .errors import InputError
+
 
 def is_number(value) -> bool:
     """Whether ``value`` is a finite number that a float can hold."""
@@ -12,3 +14,14 @@ def is_number(value) -> bool:
         return math.isfinite(value)
     except OverflowError:  # a whole number beyond every float
         return False
+
+
+def require_from_zero(what: str, constants: dict) -> None:
+    """Raise `InputError` unless all ``constants``, name -> value, are finite numbers from 0 up; ``what`` has them."""
+    for name, value in constants.items():
+        try:
+            good = math.isfinite(value) and value >= 0
+        except (TypeError, ValueError, OverflowError):  # text, an array, a whole number beyond every float
+            good = False
+        if not good:
+            raise InputError(f"{what} has {name} {value!r}: give a finite number from 0 up.")

@@ -1,15 +1,21 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Lee, Terzopoulos and Waters 1995, figure 9: a flat patch of layered tissue over flat bone with one muscle."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from headshop.sim.acting.pose import Pose, control
+from headshop.sim.errors import InputError
 from headshop.sim.tissue import contact, planes
 from headshop.sim.tissue.dynamics import step
 from headshop.sim.tissue.energy import find_contacts, pose_of
 from headshop.sim.tissue.forces import energy_gradient
+from headshop.sim.tissue.kaehler2002.parameters import DEFAULT as KAEHLER
+from headshop.sim.tissue.lee1995.constants import DEFAULT as LEE
 from headshop.sim.tissue.model import build_model
+from headshop.sim.tissue.parameters import DEFAULT
 from headshop.sim.tissue.solver import rest_state, solve
 
 NAME = "zygomaticus_major_l"
@@ -123,3 +129,12 @@ def test_fascia_slides_on_bone_and_never_enters(model):
     assert energy > 0 and gradient[node, 2] < 0 and np.abs(gradient[node, :2]).max() < 1e-12
     out = planes.project(bone, x)
     assert planes.depths(bone, out).max() < 1e-9 and out[node, 0] == x[node, 0]
+
+
+@pytest.mark.parametrize("value", [-60.0, float("nan"), "hard", None])
+def test_parameters_that_are_none_are_refused(value):
+    """A model was made of them, and rested nowhere."""
+    for constants, name in ((DEFAULT, "epidermis"), (LEE, "fascia"), (KAEHLER, "skin")):
+        with pytest.raises(InputError, match=f"has {name}"):
+            replace(constants, **{name: value})
+    assert replace(DEFAULT, epidermis=np.float32(50)).epidermis == 50

@@ -11,10 +11,17 @@ time scale of `step`.
 
 from dataclasses import dataclass
 
+from ..finite_numbers import require_from_zero
+
 
 @dataclass(frozen=True)
 class Parameters:
-    """Tissue constants; lengths mm, stiffness in the units of 3.10, ``_area`` per mm² of skin."""
+    """Tissue constants; lengths mm, stiffness in the units of 3.10, ``_area`` per mm² of skin.
+
+    Raises
+    ------
+    InputError : one is not a finite number from 0 up.
+    """
 
     epidermis: float = 60.0
     dermal_fatty: float = 30.0
@@ -49,6 +56,9 @@ class Parameters:
     #: converts the stiffness unit to g/s² where masses or outer forces act. The sheet of skin and fascia then has a modulus
     #: of 8.5 kPa over 5 mm; 31 to 42 kPa were measured on faces, locally, by aspiration (Luboz, Promayon and Payan 2014).
     dynamic_scale: float = 180.0
+
+    def __post_init__(self):
+        require_from_zero("The tissue", vars(self))
 
 
 DEFAULT = Parameters()

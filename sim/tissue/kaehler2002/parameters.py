@@ -3,6 +3,8 @@
 
 from dataclasses import dataclass
 
+from ...finite_numbers import require_from_zero
+
 
 @dataclass(frozen=True)
 class Parameters:
@@ -45,6 +47,9 @@ class Parameters:
     mass_least: float = 0.02
     damping_rate: float = 30.0
     dynamic_scale: float = 60.0
+
+    def __post_init__(self):
+        require_from_zero("The tissue", vars(self))
 
 
 DEFAULT = Parameters()

@@ -11,6 +11,8 @@ stiffness / damping, where the muscle layer holds it with 10: three seconds. The
 
 from dataclasses import dataclass
 
+from ...finite_numbers import require_from_zero
+
 
 @dataclass(frozen=True)
 class Constants:
@@ -34,6 +36,9 @@ class Constants:
     shape: float = 20.0
     restoration: float = 5.0
     biphasic_strain: float = 0.3
+
+    def __post_init__(self):
+        require_from_zero("The tissue", vars(self))
 
 
 DEFAULT = Constants()
