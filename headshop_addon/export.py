@@ -17,6 +17,7 @@ from .export_formats import write_scene
 from .outputs import Outputs
 from .plain_materials import plain_materials
 from .quiet import quiet
+from .whole_files import require_whole
 
 #: What an engine gets: all that is seen. Bones and muscles stay behind.
 PARTS = ("skin", "eye_l", "eye_r", "teeth_upper", "teeth_lower", "tongue")
@@ -51,8 +52,7 @@ def export_head(skin: bpy.types.Object, path) -> list[str]:
                 raise RuntimeError(f"{error} {printed()}") from error
         if not temporary.is_file():
             raise RuntimeError(f"Blender wrote no {path.suffix} file")
-        if path.suffix.lower() == ".usdc" and not _is_whole(temporary):
-            raise InputError(f"{path.name} cannot be written whole: is the disk full?")
+        require_whole(temporary)
         return [block.name for block in keys.key_blocks[1:]] if keys else []
 
 
@@ -63,13 +63,6 @@ def _refuse_full_disk(path: Path, error: Exception, printed: str) -> None:
         causes.append(error.strerror or str(error))
     if causes:
         raise InputError(f"{path.name} cannot be written ({causes[-1].strip()}): is the disk full?") from error
-
-
-def _is_whole(path: Path) -> bool:
-    """Whether a USDC file has its table of contents, which is written last; of one that it lacks USD's exporter only prints."""
-    with path.open("rb") as file:
-        head = file.read(24)
-    return head[:8] == b"PXR-USDC" and 0 < int.from_bytes(head[16:], "little") < path.stat().st_size
 
 
 def _action_of(keys):

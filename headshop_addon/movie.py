@@ -14,6 +14,7 @@ from .outputs import Outputs
 from .pictures import grounded, read_picture, render_frame, write_picture
 from .quiet import quiet
 from .studio import studio
+from .whole_files import require_whole
 
 GROUND = (0.085, 0.089, 0.098)
 
@@ -124,23 +125,4 @@ def encode(pictures: list[Path], path: Path, size: tuple[int, int], fps: int, fp
             bpy.ops.render.render(animation=True, scene=scene.name)
     finally:
         bpy.data.scenes.remove(scene)
-    if not _is_whole(path):
-        raise InputError(f"{path.name} cannot be written whole: is the disk full?")
-
-
-def _is_whole(path: Path) -> bool:
-    """Whether a file consists of whole MPEG-4 boxes, with the table of frames among them."""
-    if not path.is_file():
-        return False
-    kinds, at, end = set(), 0, path.stat().st_size
-    with path.open("rb") as file:
-        while at < end:
-            file.seek(at)
-            head = file.read(16)
-            size = int.from_bytes(head[:4], "big")
-            size = int.from_bytes(head[8:], "big") if size == 1 else size
-            if size < 8:
-                return False
-            kinds.add(head[4:8])
-            at += size
-    return at == end and b"moov" in kinds
+    require_whole(path)

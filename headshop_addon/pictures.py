@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Pictures as arrays: render one, read one, write one."""
 
-import os
 import tempfile
 from contextlib import suppress
 from pathlib import Path
@@ -9,8 +8,8 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from ..sim.errors import InputError
 from .quiet import quiet
+from .whole_files import require_whole
 
 
 def read_picture(path) -> np.ndarray:
@@ -24,10 +23,6 @@ def read_picture(path) -> np.ndarray:
     finally:
         bpy.data.images.remove(image)
     return pixels.reshape(height, width, 4)[::-1].copy()
-
-
-#: What every PNG ends with.
-_PNG_END = b"IEND\xaeB`\x82"
 
 
 def write_picture(path, pixels: np.ndarray) -> None:
@@ -47,17 +42,7 @@ def write_picture(path, pixels: np.ndarray) -> None:
             image.save()
     finally:
         bpy.data.images.remove(image)
-    if not _is_whole(Path(path)):
-        raise InputError(f"{Path(path).name} cannot be written whole: is the disk full?")
-
-
-def _is_whole(path: Path) -> bool:
-    """Whether a file ends as a PNG does."""
-    if not path.is_file() or path.stat().st_size < len(_PNG_END):
-        return False
-    with path.open("rb") as file:
-        file.seek(-len(_PNG_END), os.SEEK_END)
-        return file.read() == _PNG_END
+    require_whole(Path(path))
 
 
 def _as_png(scene) -> None:

@@ -103,11 +103,8 @@ def write_range_map(path, range_map: RangeMap) -> list[Path]:
             pixels = np.clip(np.rint(np.nan_to_num(colour) * 255), 0, 255).astype(np.uint8)
             files[path.with_name(document["colour"])] = png_bytes(pixels)
         files[path] = (json.dumps(document | _frame(range_map), indent=1) + "\n").encode()
-    try:
-        for file, data in files.items():
-            write_atomically(file, data)
-    except OSError as error:
-        raise InputError(f"{path} cannot be written ({error.strerror}): choose a folder you may write to.") from error
+    for file, data in files.items():
+        write_atomically(file, data)
     return list(files)
 
 
