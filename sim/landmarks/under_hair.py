@@ -276,10 +276,10 @@ def forehead(space: ShapeSpace) -> np.ndarray:
 
 def within(points, others, radius: float) -> csr_matrix:
     """(k, j) sparse, 1 where one of ``points`` (k, 3) and one of the ``others`` (j, 3) are no farther apart than that."""
-    lists = cKDTree(others).query_ball_point(points, radius)
-    ends = np.cumsum([len(i) for i in lists])
-    columns = np.concatenate([np.asarray(i, dtype=int) for i in lists])
-    return csr_matrix((np.ones(len(columns)), columns, np.r_[0, ends]), shape=(len(points), len(others)))
+    near = cKDTree(points).sparse_distance_matrix(cKDTree(others), radius, output_type="ndarray")
+    out = csr_matrix((np.ones(len(near)), (near["i"], near["j"])), shape=(len(points), len(others)))
+    out.sort_indices()  # sums do not depend on how the tree was walked
+    return out
 
 
 def varied(points, off, radius: float) -> np.ndarray:

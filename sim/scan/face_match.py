@@ -110,7 +110,7 @@ def align(tree, template, turn, shift, rounds, scale=None):
     keep = int(TRIM * len(template))
     for step in range(rounds + 1):
         moved = scale[:, None, None] * (template @ turn.transpose(0, 2, 1)) + shift[:, None]
-        distance, nearest = tree.query(moved.reshape(-1, 3))
+        distance, nearest = tree.query(moved.reshape(-1, 3), workers=-1)
         distance, nearest = distance.reshape(moved.shape[:2]), nearest.reshape(moved.shape[:2])
         inner = np.argpartition(distance, keep - 1, axis=1)[:, :keep]
         if step == rounds:
