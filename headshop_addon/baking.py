@@ -43,7 +43,13 @@ def bake(
 
     Returns what this bake made, in the form of the head's report, which holds that of earlier bakes as well: ``rig``,
     ``shapes`` and ``performance``, those that there are. A performance sets the scene's frame rate and range to its own.
+
+    Raises
+    ------
+    InputError : the performance has more frames than can be baked at once.
     """
+    if acted is not None:
+        performance.require_few(acted.frame_count)
     report = heads.read_report(skin)
     seconds = dict(report.get("seconds", {}))
     border = 1.0 if acted is None else 0.5

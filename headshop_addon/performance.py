@@ -25,7 +25,17 @@ PERFORMANCE = "headshop_performance"
 TOLERANCE = 0.02
 ITERATIONS = 60  # a frame begins where the one before ended, so little is left to do
 MET = 0.1  # mm: the last step of the solver at which a frame in motion counts as converged
+#: Frames, seven minutes of film: their motion, and the matrix of frames by frames that compresses it, take about 8 GB.
+MOST = 10_000
 _PATHS = {"headshop.muscles.": "muscles", "headshop.controls.": "controls"}
+
+
+def require_few(frames: int) -> None:
+    """Raise `InputError` for more frames than can be baked at once."""
+    if frames > MOST:
+        raise InputError(
+            f"{frames:,} frames are more than can be baked at once: bake {MOST:,} or fewer, at a lower frame rate or in parts."
+        )
 
 
 def is_keyed(skin: bpy.types.Object) -> bool:
@@ -96,8 +106,10 @@ def bake_performance(
 
     Raises
     ------
-    InputError : no such model, one that cannot move in time, not a whole head, or linked from another file.
+    InputError : more than `MOST` frames, no such model, one that cannot move in time, not a whole head, or linked from
+        another file.
     """
+    require_few(len(poses))
     acting = model_named(model)
     if fps is not None and not acting.moves:
         raise InputError(f"The model {model} comes to rest in every frame: only {DEFAULT} bakes with dynamics.")

@@ -35,10 +35,11 @@ class HEADSHOP_OT_bake_performance(Job, bpy.types.Operator):
 
     def work(self, context):
         """Simulate frame by frame and write."""
-        from ..headshop_addon.performance import bake_performance, keyed_poses
+        from ..headshop_addon.performance import bake_performance, keyed_poses, require_few
 
         scene, skin = context.scene, active.skin(context)
         frames = range(scene.frame_start, scene.frame_end + 1)
+        require_few(len(frames))
         poses = keyed_poses(skin, frames, scene)
         moving = {}
         if self.dynamics:

@@ -7,7 +7,9 @@ import sys
 import numpy as np
 import pytest
 
+from headshop.sim.acting.pose import Pose
 from headshop.sim.acting.principal import principal_shapes
+from headshop.sim.errors import InputError
 from headshop.sim.mesh_subdivision import drawn
 from headshop.sim.progress import finish
 
@@ -168,7 +170,6 @@ def test_keyed_sliders_become_poses(bpy, skin, performance):
 def test_a_simulated_performance_plays_without_the_extension(
     bpy, skin, performance, tmp_path, reference_model, monkeypatch
 ):
-    from headshop.sim.acting.pose import Pose
 
     monkeypatch.setattr("headshop.sim.tissue.model.build_model", lambda head: reference_model)
 
@@ -200,6 +201,19 @@ def test_a_bake_says_what_it_baked_itself(bpy, skin, monkeypatch):
     assert bake(acted=acted) == "3 frames in 2 shape keys of the skin"
     report = heads.read_report(skin)
     assert report["shapes"].keys() == {"smile", "frown", "blink"} and report["performance"]["frames"] == 3
+
+
+def test_more_frames_than_memory_holds_are_refused_at_once(bpy, skin, performance):
+    """Ten hours, which a file may hold, ended after many of them in: not enough memory."""
+    from headshop.headshop_addon import baking
+    from headshop.sim.acting.performance import Performance
+
+    acted = Performance({"jaw_open": ((0.0, 0.0), (36000.0, 0.2))}, 24.0)
+    with pytest.raises(InputError, match="864,001 frames .* bake 10,000 or fewer"):
+        finish(baking.bake(skin, "expressions", acted))
+    with pytest.raises(InputError, match="10,001 frames"):
+        finish(performance.bake_performance(skin, [Pose()] * 10_001))
+    assert not baking.is_baked(skin)
 
 
 def test_a_slow_performance_bakes_at_its_own_rate(bpy, skin):
