@@ -26,7 +26,8 @@ class Mesh:
 
     Raises
     ------
-    InputError : vertices or faces have another shape; lists and numbers of other kinds are taken.
+    InputError : vertices or faces have another shape, or faces are no whole numbers; lists and numbers of other kinds are
+        taken.
     """
 
     vertices: np.ndarray
@@ -43,7 +44,8 @@ class Mesh:
 
     @classmethod
     def from_triangles(cls, vertices, triangles, **more) -> "Mesh":
-        """A mesh of triangles (m, 3). Raises `InputError` where they have another shape."""
+        """A mesh of triangles (m, 3). Raises `InputError` where they have another shape or are no
+        whole numbers."""
         triangles = _table(triangles, "triangles", 3, np.int32)
         faces = np.full((len(triangles), 4), -1, dtype=np.int32)
         faces[:, :3] = triangles
@@ -93,9 +95,15 @@ class Mesh:
 def _table(values, name: str, columns: int, kind) -> np.ndarray:
     """(k, columns) of ``values``, which may come one after another too."""
     try:
-        table = np.asarray(values, dtype=kind)
-    except (TypeError, ValueError) as error:
+        given = np.asarray(values)
+        with np.errstate(invalid="ignore"):  # NaN as a whole number
+            table = given.astype(kind, copy=False)
+    except (TypeError, ValueError, OverflowError) as error:
         raise InputError(f"The {name} of a mesh are no table of numbers ({error}): give (n, {columns}).") from None
+    if kind is np.int32 and table.dtype != given.dtype and not np.array_equal(table, given):
+        raise InputError(
+            f"The {name} of a mesh are not all whole numbers below 2^31: give indices of vertices, from 0 on."
+        )
     if table.ndim == 2 and table.shape[1] == columns:
         return table  # itself, where it is one already
     if name == "faces" and table.ndim == 2 and table.shape[1] == 3:

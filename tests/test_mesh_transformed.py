@@ -67,3 +67,14 @@ def test_a_mesh_of_lists_and_other_numbers_is_one_of_arrays():
     ):
         with pytest.raises(InputError, match=word):
             bad()
+
+
+@pytest.mark.parametrize("index", [2.7, np.nan, 2**32 + 2, 10**30, "x"])
+def test_faces_of_parts_of_vertices_are_refused(index):
+    """2.7 was taken for the vertex 2, and so was 2^32 + 2, without a word."""
+    points = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
+    for make, faces in ((Mesh, [[0, 1, index, 3]]), (Mesh, [[0, 1, index]]), (Mesh.from_triangles, [[0, 1, index]])):
+        with pytest.raises(InputError, match="(faces|triangles) of a mesh are no"):
+            make(points, faces)
+    whole = Mesh(points, [[0.0, 1.0, 2.0, 3.0]])
+    np.testing.assert_array_equal(whole.faces, [[0, 1, 2, 3]])
