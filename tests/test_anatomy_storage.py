@@ -4,8 +4,11 @@
 import numpy as np
 import pytest
 
+from headshop.sim.acting import arkit, expressions
 from headshop.sim.anatomy.storage import REFERENCE, load_head, save_head
 from headshop.sim.errors import InputError
+from headshop.sim.relax import movement, responses
+from headshop.sim.tissue.model import strengths
 
 
 def test_a_head_comes_back_as_it_was(reference, tmp_path):
@@ -44,3 +47,27 @@ def test_parts_that_it_lacks_and_counts_that_it_has_not_are_refused(reference):
         reference.with_vertices({"nose": np.zeros((3, 3))})
     with pytest.raises(InputError, match="cannot take positions"):
         reference.with_vertices({"skin": np.zeros((3, 3))})
+
+
+READERS = (expressions.expressions, arkit.poses, arkit.over, strengths)
+
+
+@pytest.mark.parametrize(
+    "read", (*READERS, responses.responses, movement.read_movement), ids=lambda read: read.__name__
+)
+def test_a_table_that_is_not_there_is_told(read, tmp_path):
+    for path in (tmp_path / "nowhere.json", tmp_path):
+        with pytest.raises(InputError, match=f"{path} cannot be read"):
+            read(path)
+
+
+@pytest.mark.parametrize("read", READERS, ids=lambda read: read.__name__)
+def test_a_table_of_something_else_is_told(read, tmp_path):
+    path = tmp_path / "table.json"
+    for text in ("{", "[]", "{}", '{"expressions": 3, "shapes": 3, "over": 3, "muscles": 3}', "\x80"):
+        path.write_text(text, encoding="latin-1")
+        with pytest.raises(InputError, match="table.json is no table with"):
+            read(path)
+    if read is arkit.over:
+        path.write_bytes(b'\xef\xbb\xbf{"over": {}}')  # with a byte order mark
+        assert read(path) == {}

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The ARKit blendshapes as poses, from the table ``assets/tables/arkit.json``."""
 
-import json
 from pathlib import Path
 
+from ..json_keys import read_table
 from .pose import Pose, pose_from
 
 TABLE = Path(__file__).resolve().parents[2] / "assets" / "tables" / "arkit.json"
@@ -12,9 +12,14 @@ _SIDEWAYS = ("jaw_side", "gaze_x", "gaze_l_x", "gaze_r_x")
 
 
 def poses(path=TABLE) -> dict[str, Pose]:
-    """ARKit's name, exactly as Apple spells it -> Pose."""
+    """ARKit's name, exactly as Apple spells it -> Pose.
+
+    Raises
+    ------
+    InputError : ``path`` cannot be read, or is no such table.
+    """
     out = {}
-    for name, channels in json.loads(Path(path).read_text(encoding="utf-8"))["shapes"].items():
+    for name, channels in read_table(path, "shapes")["shapes"].items():
         out[name] = pose_from(channels)
         if name.endswith("Left"):
             out[name.removesuffix("Left") + "Right"] = pose_from(mirrored(channels))
@@ -22,8 +27,8 @@ def poses(path=TABLE) -> dict[str, Pose]:
 
 
 def over(path=TABLE) -> dict[str, str]:
-    """Name of a shape that plays on top of another -> name of that other."""
-    return json.loads(Path(path).read_text(encoding="utf-8"))["over"]
+    """Name of a shape that plays on top of another -> name of that other. Raises `InputError` as `poses`."""
+    return read_table(path, "over")["over"]
 
 
 def mirrored(channels: dict[str, float]) -> dict[str, float]:

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Expressions as muscle contractions, from the table ``assets/tables/expressions.json``."""
 
-import json
 from pathlib import Path
 
 from ..anatomy.head import Head
+from ..json_keys import read_table
 from .pose import CONTROLS, Pose, pose_from
 
 TABLE = Path(__file__).resolve().parents[2] / "assets" / "tables" / "expressions.json"
@@ -27,8 +27,13 @@ def _both_sides(values: dict[str, float], paired: set[str]) -> dict[str, float]:
 
 
 def expressions(path=TABLE) -> dict[str, Pose]:
-    """Name -> Pose of every expression of the table (neutral excluded), in its order."""
-    table = json.loads(Path(path).read_text(encoding="utf-8"))
+    """Name -> Pose of every expression of the table (neutral excluded), in its order.
+
+    Raises
+    ------
+    InputError : ``path`` cannot be read, or is no such table.
+    """
+    table = read_table(path, "expressions", "unpaired_muscles")
     unpaired = set(table["unpaired_muscles"]) | set(CONTROLS)
     out = {}
     for name, row in table["expressions"].items():

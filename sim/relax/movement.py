@@ -9,6 +9,7 @@ or funnelled, a nose that wrinkles and a jaw that opens.
 The table ``assets/tables/skin_movement.csv``, by ``assets/generators/skin_movement.py``, names its source.
 """
 
+import io
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,7 @@ from scipy.sparse.linalg import spsolve
 from ..adapt.rest import rest_of
 from ..adapt.smooth_system import laplacian
 from ..anatomy.head import Head
+from ..file_bytes import file_bytes
 
 TABLE = Path(__file__).resolve().parents[2] / "assets" / "tables" / "skin_movement.csv"
 
@@ -49,8 +51,13 @@ MIDLINE = 10.0  # mm beside it over which one side's muscle loses its say
 
 
 def read_movement(path=TABLE) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """Points (k, 3) mm on the left half of the reference's skin, and unit -> (k, 3) mm that they move."""
-    table = np.loadtxt(path, delimiter=",", skiprows=2, dtype=float)
+    """Points (k, 3) mm on the left half of the reference's skin, and unit -> (k, 3) mm that they move.
+
+    Raises
+    ------
+    InputError : ``path`` cannot be read.
+    """
+    table = np.loadtxt(io.BytesIO(file_bytes(path)), delimiter=",", skiprows=2, dtype=float)
     return table[:, :3], {unit: table[:, 3 + 3 * k : 6 + 3 * k] for k, unit in enumerate(UNITS)}
 
 

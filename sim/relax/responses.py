@@ -4,6 +4,7 @@
 The table ``assets/tables/expression_responses.npz`` is made by ``assets/generators/make_expression_responses.py``.
 """
 
+import io
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -12,6 +13,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..anatomy.head import Head
+from ..file_bytes import file_bytes
 
 TABLE = Path(__file__).resolve().parents[2] / "assets" / "tables" / "expression_responses.npz"
 
@@ -69,8 +71,8 @@ class Responses:
 
 @lru_cache(maxsize=1)
 def responses(path=TABLE) -> Responses:
-    """The table, with the right side's muscles mirrored from the left's."""
-    with np.load(path, allow_pickle=False) as table:
+    """The table, with the right side's muscles mirrored from the left's. Raises `InputError` where ``path`` cannot be read."""
+    with np.load(io.BytesIO(file_bytes(path)), allow_pickle=False) as table:
         jaw, fields, smile = (table[name].astype(float) for name in ("jaw", "fields", "smile"))
         return Responses(*both_sides(fields, table["mirror"]), jaw, smile)
 

@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """`build_model`: from a head to a model that acts."""
 
-import json
 from pathlib import Path
 
 import numpy as np
 
 from ..anatomy.head import JAW_PARTS, Head
+from ..json_keys import read_table
 from . import calibration
 from .contact import build_surfaces
 from .drawn_contact import build_drawn
@@ -29,8 +29,13 @@ STRENGTHS = Path(__file__).resolve().parents[2] / "assets" / "tables" / "strengt
 
 
 def strengths(path=STRENGTHS) -> dict:
-    """Muscle base name -> {"excursion_mm", …}: what the skin is seen to move at full contraction."""
-    return json.loads(Path(path).read_text(encoding="utf-8"))["muscles"]
+    """Muscle base name -> {"excursion_mm", …}: what the skin is seen to move at full contraction.
+
+    Raises
+    ------
+    InputError : ``path`` cannot be read, or is no such table.
+    """
+    return read_table(path, "muscles")["muscles"]
 
 
 def build_model(head: Head, parameters: Parameters = DEFAULT, table: dict | None = None) -> Model:
