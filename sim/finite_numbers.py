@@ -16,6 +16,16 @@ def is_number(value) -> bool:
         return False
 
 
+def require_tolerance(value) -> None:
+    """Raise `InputError` unless ``value`` is a finite number above 0."""
+    try:
+        good = 0 < value < math.inf
+    except (TypeError, ValueError):  # text, an array
+        good = False
+    if not good:
+        raise InputError(f"The tolerance is {value!r}: give millimetres, a finite number above 0.")
+
+
 def require_from_zero(what: str, constants: dict) -> None:
     """Raise `InputError` unless all ``constants``, name -> value, are finite numbers from 0 up; ``what`` has them."""
     for name, value in constants.items():

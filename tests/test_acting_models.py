@@ -72,9 +72,25 @@ def test_a_control_that_does_not_fit_is_refused(acting, change):
         found.solve(model, replace(control(model, Pose()), **change), max_iterations=2)
 
 
+def test_what_is_no_control_no_pose_or_no_tolerance_is_refused(acting):
+    """They were errors of Python's, or tolerances at which nothing ever comes to rest."""
+    found, model = acting
+    with pytest.raises(InputError, match="given as Pose: give a Control"):
+        found.solve(model, Pose())
+    with pytest.raises(InputError, match="given as dict: give a Pose"):
+        control(model, {"jaw_open": 1.0})
+    if found.name == "waters":
+        return  # it does not iterate
+    for none in (0, -1.0, np.nan, np.inf, "tight"):
+        with pytest.raises(InputError, match="tolerance"):
+            found.solve(model, control(model, Pose()), tolerance=none)
+
+
 @pytest.mark.parametrize("model", MODELS)
 def test_a_head_that_is_none_is_refused(model, reference):
     """In metres it became a model that did not move."""
+    with pytest.raises(InputError, match="given as NoneType: give a Head"):
+        model_named(model).build(None)
     small = reference.with_vertices({part: points / 1000 for part, points in reference.vertices().items()})
     with pytest.raises(InputError, match="millimetres"):
         model_named(model).build(small)

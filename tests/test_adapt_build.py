@@ -300,6 +300,11 @@ def test_what_is_no_scan_and_no_landmark_is_refused_in_one_sentence(reference, s
             finish(build_head(reference, scan, marks | {"prn": place}))
     with pytest.raises(InputError, match='unknown landmark "prm"'):
         finish(build_head(reference, scan, marks | {"prm": [0, 0, 0]}))
+    for given in (list(marks.items()), None):
+        with pytest.raises(InputError, match=f"given as {type(given).__name__}: give a dict"):
+            finish(build_head(reference, scan, given))
+    with pytest.raises(InputError, match="given as NoneType: give a Head"):
+        finish(build_head(None, scan, marks))
     for detail in (-3, "big", 1e3):
         with pytest.raises(InputError, match="whole number from 0"):
             finish(build_head(reference, scan, marks, detail=detail))

@@ -57,6 +57,17 @@ def test_missing_landmarks_are_left_out_and_other_keys_tolerated(tmp_path):
     assert set(read_landmarks(path)) == set(FACE) - {"gn"}
 
 
+@pytest.mark.parametrize(("left", "count"), [(0, "none"), (2, "2")])
+def test_a_file_of_landmarks_of_which_hardly_one_is_sure_says_so(tmp_path, left, count):
+    """It was said to give no landmarks, or two of the nine that it has."""
+    names = list(FACE)[left:]
+    said = _said(_file(tmp_path, missing=names))
+    assert f"has 9 landmarks, of which {count} can be used" in said and "by hand" in said
+    confidence = dict.fromkeys(names, 0.05)
+    assert said == _said(_file(tmp_path, confidence=confidence, mid_air=[], found={n: FACE[n] for n in names}))
+    assert "gives 3 landmarks" in _said(_file(tmp_path, landmarks={n: FACE[n] for n in list(FACE)[:3]}))
+
+
 @pytest.mark.parametrize(
     ("changes", "words"),
     [

@@ -130,8 +130,13 @@ def control(model: Model, pose: Pose) -> Control:
 
     Raises
     ------
-    InputError : the pose names a muscle that the model does not have, or a value is not a finite number.
+    InputError : what is given is no pose, names a muscle that the model does not have, or has a value that is not a finite
+        number.
     """
+    if not isinstance(pose, Pose):
+        raise InputError(
+            f"The pose is given as {type(pose).__name__}: give a Pose, or let pose_from make one of a dict of channels."
+        )
     _require_numbers(pose.values())
     index = {name: k for k, name in enumerate(model.muscle_names)}
     activation = np.zeros(len(index))

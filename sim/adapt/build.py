@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..anatomy.head import Head
+from ..anatomy.head import Head, require_head
 from ..anatomy.landmark_names import SKIN
 from ..detail.detail_map import DetailMaps
 from ..detail.maps import SIZE, detail_maps, require_size
@@ -80,11 +80,12 @@ def build_head(
 
     Raises
     ------
-    InputError : the scan is no surface; the landmarks are no places, too few, do not form a face, or do not belong to this
-        scan; or no good fit was found.
+    InputError : the reference is no head; the scan is no surface; the landmarks are no places, too few, do not form a
+        face, or do not belong to this scan; or no good fit was found.
     """
     from ..landmarks.first_look import first_look
 
+    require_head(reference)
     require_surface(scan)
     given = usable(landmarks, "The landmark set")
     require_choice(relax)

@@ -8,6 +8,7 @@ found has been corrected, and is as good as any that was picked.
 
 import difflib
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -123,6 +124,12 @@ def parse_landmarks(document, source: str = "The landmark file") -> LandmarkFile
     sure = {n for n, c in found.items() if c >= SURE}
     left = {m for m in missing if isinstance(m, str)} | (found.keys() - sure)
     positions = {n: _position(source, n, p) for n, p in given.items() if n not in left}
+    if len(positions) < LEAST <= len(given):
+        raise InputError(
+            f"{source} has {len(given)} landmarks, of which {len(positions) or 'none'} can be used, for the others are "
+            f'listed under "missing", or were found hardly surely or in mid-air: place at least {LEAST} by hand, such as '
+            "ex_l, ex_r, prn and gn."
+        )
     require_usable(positions, source)
     return LandmarkFile(positions, {n: found[n] for n in found if n in positions})
 
@@ -141,7 +148,12 @@ def _found(document) -> dict[str, float]:
 
 def usable(landmarks: dict[str, np.ndarray], source: str) -> dict[str, np.ndarray]:
     """Name -> (3,) mm of the skin's landmarks that a program gives, the skull's left out; raises `InputError` where
-    `require_usable` does, and for names and places that are none."""
+    `require_usable` does, for what is no dict, and for names and places that are none."""
+    if not isinstance(landmarks, Mapping):
+        raise InputError(
+            f"{source} is given as {type(landmarks).__name__}: give a dict of names and places in mm, such as "
+            '{"prn": [x, y, z]}.'
+        )
     given = {}
     for name, place in landmarks.items():
         if name in SKULL and name not in SKIN:

@@ -190,6 +190,12 @@ class Head:
         return replace(self, parts=parts)
 
 
+def require_head(head) -> None:
+    """Raise `InputError` unless ``head`` is a `Head`."""
+    if not isinstance(head, Head):
+        raise InputError(f"The head is given as {type(head).__name__}: give a Head, such as storage.load_head() reads.")
+
+
 def landmark_array(positions: dict[str, np.ndarray], names=landmark_names.SKIN) -> np.ndarray:
     """(k, 3) in the order of ``names``; NaN where a landmark is absent."""
     missing = np.full(3, np.nan)

@@ -12,7 +12,7 @@ from ..tissue.contact import eye_planes, lip_contacts, sheet_contacts
 from ..tissue.jaw import jaw_transform
 from ..tissue.lid_targets import lid_targets
 from ..tissue.planes import joined, project
-from ..tissue.structures import Control, Solution
+from ..tissue.structures import Control, Solution, require_control
 from .confluence import sharing
 from .jaw import turned
 from .model import Model
@@ -51,7 +51,8 @@ def look(model: Model, control: Control) -> tuple[State, bool]:
 
 
 def displaced(model: Model, control: Control) -> np.ndarray:
-    """(n, 3) mm, the skin in the pose."""
+    """(n, 3) mm, the skin in the pose. Raises `InputError` where that is no control of the model."""
+    require_control(control)
     tension = control.contractions(len(model.muscle_names))
     rotation, translation = jaw_transform(model.jaw, *control.jaw)
     closed = not np.any(control.jaw)

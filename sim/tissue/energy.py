@@ -19,7 +19,7 @@ from .lid_meeting import shut_share
 from .lid_targets import lid_targets
 from .muscle_field import turned_lips
 from .planes import Planes, joined
-from .structures import Control, Model
+from .structures import Control, Model, require_control
 from .surroundings import Surroundings, outer_forces
 from .volume import corner_gather
 
@@ -67,7 +67,9 @@ def posed_reference(model: Model, rotation, translation) -> np.ndarray:
 
 
 def pose_of(model: Model, control: Control, lid_goal: np.ndarray | None = None) -> Pose:
-    """The constants of a solve for ``control``; ``lid_goal`` (v, 3) mm as in `Pose` where it is known already."""
+    """The constants of a solve for ``control``; ``lid_goal`` (v, 3) mm as in `Pose` where it is known already.
+    Raises `InputError` where that is no control of the model."""
+    require_control(control)
     rotation, translation = jaw_transform(model.jaw, *control.jaw)
     reference = posed_reference(model, rotation, translation)
     m = model.muscles

@@ -9,7 +9,7 @@ by the head's own share, tied weakly, so that they move freely and still come ba
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..anatomy.head import Head
+from ..anatomy.head import Head, require_head
 from ..errors import InputError
 from ..mesh import vertex_areas, vertex_normals
 from .geometry import Surface, cotangent_stiffness, short_diagonals, smoothed
@@ -58,8 +58,9 @@ def build_layers(head: Head, parameters: Parameters) -> Layers:
 
     Raises
     ------
-    InputError : a part of the head is in places that are none, or the head is not in millimetres.
+    InputError : it is no head, a part of it is in places that are none, or it is not in millimetres.
     """
+    require_head(head)
     _require_millimetres(head)
     skin = head.skin
     v, tri = skin.vertices, short_diagonals(skin.vertices, skin.faces)

@@ -9,6 +9,7 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
+from ..finite_numbers import require_tolerance
 from .clearing import cleared
 from .curvature import Curvature
 from .diagnostics import diagnose
@@ -35,7 +36,12 @@ def solve(
 
     state : where to start (a pose near by makes it fast); the rest by default.
     tolerance : mm; the largest remaining quasi-Newton step at which the pose counts as settled.
+
+    Raises
+    ------
+    InputError : the control or the tolerance is none, or the control was made for another head.
     """
+    require_tolerance(tolerance)
     pose = pose_of(model, control)
     if state is not None:
         start = _carried_along(model, state, pose)

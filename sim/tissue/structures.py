@@ -214,6 +214,14 @@ _ASKED = {
 }
 
 
+def require_control(control) -> None:
+    """Raise `InputError` unless ``control`` is a `Control`."""
+    if not isinstance(control, Control):
+        raise InputError(
+            f"The control is given as {type(control).__name__}: give a Control, which pose.control makes of a model and a Pose."
+        )
+
+
 @dataclass(frozen=True, eq=False)
 class Control:
     """What is asked of the face.

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..jaw import jaw_transform
 from ..lid_targets import lid_targets
-from ..structures import Control
+from ..structures import Control, require_control
 from .bulge import rise
 from .fibres import arc_lengths, contracted
 from .merged import aims, settled
@@ -104,7 +104,8 @@ def _mean_share(axes: Axes) -> np.ndarray:
 
 
 def pose_of(model: Model, control: Control) -> Pose:
-    """The constants of a solve for ``control``."""
+    """The constants of a solve for ``control``. Raises `InputError` where that is no control of the model."""
+    require_control(control)
     n = model.count
     rotation, translation = jaw_transform(model.jaw, *control.jaw)
     skin = carried(model.rest[:n], model.layers.jaw, rotation, translation)

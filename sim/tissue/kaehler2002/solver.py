@@ -7,6 +7,7 @@ to muscle is left out, as in the paper. In `step` the feet go to where the contr
 
 import numpy as np
 
+from ...finite_numbers import require_tolerance
 from ..eye_surface import depth_in_eyeballs
 from ..planes import Planes, depths, project
 from ..structures import Control, Solution, State
@@ -40,8 +41,10 @@ def solve(
 
     Raises
     ------
+    InputError : the control or the tolerance is none, or the control was made for another head.
     DivergedError : positions left the finite numbers.
     """
+    require_tolerance(tolerance)
     pose = pose_of(model, control)
     require_finite(pose.nodes, "attachments")
     n = model.count

@@ -8,7 +8,7 @@ import numpy as np
 from ..energy import posed_reference
 from ..jaw import jaw_transform
 from ..lid_targets import lid_targets
-from ..structures import Control
+from ..structures import Control, require_control
 from .structures import LeeModel
 from .volume import turned_rest
 
@@ -30,7 +30,8 @@ class Pose:
 
 
 def pose_of(model: LeeModel, control: Control) -> Pose:
-    """The constants of motion for ``control``."""
+    """The constants of motion for ``control``. Raises `InputError` where that is no control of the model."""
+    require_control(control)
     n = model.count
     rotation, translation = jaw_transform(model.jaw, *control.jaw)
     reference = posed_reference(model, rotation, translation)

@@ -3,6 +3,7 @@
 
 import numpy as np
 
+from ...finite_numbers import require_tolerance
 from ..structures import Control, Solution
 from .diagnostics import diagnose
 from .motion import Barriers, barriers, euler_step
@@ -84,8 +85,10 @@ def solve(
 
     Raises
     ------
+    InputError : the control or the tolerance is none, or the control was made for another head.
     UnstableError : the steps blow up, and halving them three times does not help.
     """
+    require_tolerance(tolerance)
     pose = pose_of(model, control)
     start = rest_state(model) if state is None else state
     begin = LeeState(start.positions + pose.reference - start.reference, np.zeros_like(pose.reference), pose.reference)
