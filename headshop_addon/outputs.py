@@ -28,6 +28,8 @@ class Outputs:
 
     def __exit__(self, kind, error, trace):
         try:
+            if isinstance(error, InputError):
+                self._name_outputs(error)
             if kind is None:
                 for temporary, final in self._folders:
                     self._fill(temporary, final)
@@ -95,6 +97,14 @@ class Outputs:
         scratch = self._scratch_beside(path / "any")
         self._renames += [(scratch / name, path / name) for name in names]
         return scratch
+
+    def _name_outputs(self, error: InputError) -> None:
+        """Raise ``error`` again if it speaks of a temporary file, with the name that the user gave instead."""
+        said = str(error)
+        for temporary, final in (*self._renames, *self._folders):
+            said = said.replace(str(temporary), str(final))
+        if said != str(error):
+            raise InputError(said) from error
 
     def _spare_inputs(self, path: Path) -> None:
         if path.resolve() in self._inputs:

@@ -1,11 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Outputs appear whole or not at all; motions compress to few shapes."""
 
+import errno
+
 import numpy as np
 import pytest
 
 from headshop.headshop_addon.outputs import Outputs
 from headshop.sim.acting.principal import principal_shapes
+from headshop.sim.anatomy import storage
 from headshop.sim.errors import InputError
 
 
@@ -84,6 +87,30 @@ def test_a_link_stays_one(tmp_path):
             file.write_text("new")
         assert (tmp_path / name).is_symlink() and (tmp_path / to).read_text() == "new"
         assert [p.name for p in (tmp_path / to).parent.iterdir()] == ["head.blend"]
+
+
+def test_a_full_disk_is_told_with_the_name_that_was_given(tmp_path, monkeypatch):
+    """It was that of a hidden folder, which is gone by then."""
+
+    def full(path, data):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(storage, "_write_beside", full)
+    monkeypatch.chdir(tmp_path)
+    for begin, told in (
+        (lambda outputs: outputs.file("found.json"), "found.json"),
+        (
+            lambda outputs: outputs.folder(tmp_path / "plain", ["skin.ply"]) / "skin.ply",
+            tmp_path / "plain" / "skin.ply",
+        ),
+    ):
+        with pytest.raises(InputError) as refusal, Outputs() as outputs:
+            storage.write_atomically(begin(outputs), b"data")
+        assert str(refusal.value).startswith(f"{told} cannot be written (No space left on device): is the disk full")
+    with pytest.raises(InputError, match="^The scan has no faces"), Outputs() as outputs:
+        outputs.file("found.json")
+        raise InputError("The scan has no faces.")
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_file_and_a_folder_of_one_name_are_refused(tmp_path):
