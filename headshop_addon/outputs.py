@@ -4,6 +4,7 @@
 import os
 import shutil
 import tempfile
+from contextlib import contextmanager
 from pathlib import Path
 
 from ..sim.errors import InputError
@@ -32,12 +33,14 @@ class Outputs:
                 self._name_outputs(error)
             if kind is None:
                 for temporary, final in self._folders:
-                    self._fill(temporary, final)
+                    with _told(final):
+                        self._fill(temporary, final)
                 for temporary, final in self._renames:
-                    if temporary.exists():
-                        os.replace(temporary, final)
-                    else:
-                        final.unlink(missing_ok=True)
+                    with _told(final):
+                        if temporary.exists():
+                            os.replace(temporary, final)
+                        else:
+                            final.unlink(missing_ok=True)
                 self._made.clear()
         finally:
             for scratch in self._scratch:
@@ -60,7 +63,10 @@ class Outputs:
         ------
         InputError : nothing can be written there, it is a folder, or an input.
         """
-        path = Path(path)
+        with _told(path):
+            return self._file(Path(path), beside)
+
+    def _file(self, path: Path, beside: str | None) -> Path:
         if path.is_dir():
             raise InputError(f"{path} is a folder: give the name of a file to write.")
         self._spare_inputs(path)
@@ -88,7 +94,10 @@ class Outputs:
         ------
         InputError : nothing can be written there, it is or becomes a file, or one of ``names`` there is an input.
         """
-        path = Path(path)
+        with _told(path):
+            return self._folder(Path(path), names)
+
+    def _folder(self, path: Path, names) -> Path:
         becoming = [final.resolve() for _, final in self._renames]
         if (path.exists() and not path.is_dir()) or path.resolve() in becoming:
             raise InputError(f"{path} is a file: give a folder to write to.")
@@ -107,7 +116,7 @@ class Outputs:
             raise InputError(said) from error
 
     def _spare_inputs(self, path: Path) -> None:
-        if path.resolve() in self._inputs:
+        if Path(os.path.realpath(path)) in self._inputs:  # `resolve` stumbles over a link to itself
             raise InputError(f"{path} would be replaced, which is an input: write to another place.")
 
     def _scratch_beside(self, path: Path) -> Path:
@@ -134,5 +143,15 @@ class Outputs:
             missing.append(folder)
             folder = folder.parent
         for each in reversed(missing):
-            each.mkdir()
-            self._made.append(each)
+            if not each.exists():  # as that above a folder that was missing, a/.., by now
+                each.mkdir()
+                self._made.append(each)
+
+
+@contextmanager
+def _told(path):
+    """`InputError` instead of an error of the file system about ``path``."""
+    try:
+        yield
+    except OSError as error:
+        raise InputError(f"{path} cannot be written ({error.strerror or error}): give another output.") from error

@@ -2,6 +2,7 @@
 """Outputs appear whole or not at all; motions compress to few shapes."""
 
 import errno
+import os
 
 import numpy as np
 import pytest
@@ -87,6 +88,37 @@ def test_a_link_stays_one(tmp_path):
             file.write_text("new")
         assert (tmp_path / name).is_symlink() and (tmp_path / to).read_text() == "new"
         assert [p.name for p in (tmp_path / to).parent.iterdir()] == ["head.blend"]
+
+
+def test_what_cannot_be_renamed_in_the_end_is_told(tmp_path, monkeypatch):
+    """Others' files in a folder in which nobody replaces others' are an example: it was our fault, in a hidden folder."""
+
+    def refused(old, new):
+        raise PermissionError(errno.EPERM, "Operation not permitted", str(old))
+
+    monkeypatch.setattr(os, "replace", refused)
+    with (
+        pytest.raises(InputError, match=f"^{tmp_path}/a.txt cannot be written .Operation not permitted"),
+        Outputs() as outputs,
+    ):
+        outputs.file(tmp_path / "a.txt").write_text("a")
+    assert not list(tmp_path.iterdir())
+
+
+def test_names_too_long_or_through_what_is_not_there(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for begin in (lambda outputs: outputs.file("x" * 256), lambda outputs: outputs.folder("x" * 256, ["a.txt"])):
+        with pytest.raises(InputError, match="cannot be written .File name too long"), Outputs() as outputs:
+            begin(outputs)
+    longest = tmp_path / ("x" * 250 + ".json")
+    storage.write_atomically(longest, b"whole")
+    assert longest.read_bytes() == b"whole" and len(list(tmp_path.iterdir())) == 1
+    for path in (tmp_path / "nowhere" / ".." / "a.txt", tmp_path / "loop.txt"):
+        (tmp_path / "loop.txt").unlink(missing_ok=True)
+        (tmp_path / "loop.txt").symlink_to("loop.txt")
+        with Outputs((longest,)) as outputs:
+            outputs.file(path).write_text("new")
+        assert path.read_text() == "new"
 
 
 def test_a_full_disk_is_told_with_the_name_that_was_given(tmp_path, monkeypatch):

@@ -163,7 +163,7 @@ def write_atomically(path, data: bytes) -> None:
 
 
 def _write_beside(path: Path, data: bytes) -> None:
-    handle, temporary = tempfile.mkstemp(prefix="." + path.name + ".", dir=path.parent)
+    handle, temporary = tempfile.mkstemp(prefix=".headshop-", dir=path.parent)
     try:
         with os.fdopen(handle, "wb") as stream:
             stream.write(data)
