@@ -72,7 +72,7 @@ def parser() -> argparse.ArgumentParser:
     sizes = (0, 512, 1024, 2048, 4096)
     about = "pixels along a side of the displacement and normal map, 0 for none (default: 1024)"
     build.add_argument("--detail", type=int, choices=sizes, default=1024, metavar="SIZE", help=about)
-    build.add_argument("--name", help="what to call the head (default: the scan's name)")
+    build.add_argument("--name", type=_text, help="what to call the head (default: the scan's name)")
     relax = "make the face neutral: auto (where the lips are parted; the default), always or never"
     build.add_argument("--relax", choices=RELAX, default="auto", metavar="WHEN", help=relax)
     leave = "what to leave out as no skin: auto (all of it; the default), never, or of these, with commas between: "
@@ -112,9 +112,18 @@ def parser() -> argparse.ArgumentParser:
 
 def _path(text: str) -> str:
     """What the name of a file or folder may be. An empty one, as a script's unset variable gives, would mean the current
-    folder."""
+    folder. Where a shell leaves a ~ as it is, as after --export=, it means the home folder all the same."""
     if not text:
         raise argparse.ArgumentTypeError("the name is empty: give one")
+    return os.path.expanduser(_text(text))
+
+
+def _text(text: str) -> str:
+    """A name that Blender and file formats can hold: bytes that are no UTF-8 come from Python as halves of characters."""
+    try:
+        text.encode()
+    except UnicodeEncodeError:
+        raise argparse.ArgumentTypeError(f"the name {text!r} is no text in UTF-8: rename it") from None
     return text
 
 
@@ -147,6 +156,7 @@ def main(argv: list[str] | None = None) -> int:
     struck: list[int] = []
     if argv is None and os.name == "posix":
         atexit.register(_die_by, struck)
+        _open_streams()
     try:
         _print_anything()
         status = _ending(argv, struck)
@@ -222,6 +232,17 @@ def _die_by(struck: list[int]) -> None:
             shutil.rmtree(blenders, ignore_errors=True)
         signal.signal(number, signal.SIG_DFL)
         os.kill(os.getpid(), number)
+
+
+def _open_streams() -> None:
+    """Open what is closed of stdin, stdout and stderr onto nothing: the next file opened would take its number, and get what
+    Blender prints."""
+    for number in range(3):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)  # takes the lowest number that is free: this one
+    sys.stdout, sys.stderr = sys.stdout or os.fdopen(1, "w"), sys.stderr or os.fdopen(2, "w")
 
 
 def _print_anything() -> None:

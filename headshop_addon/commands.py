@@ -4,6 +4,8 @@
 Every function takes the parsed options; `InputError` means that the user is told and nothing was written.
 """
 
+import os
+import stat
 from pathlib import Path
 
 from ..sim.errors import InputError
@@ -173,9 +175,22 @@ def sample(options) -> None:
 
 
 def _require_file(path, what: str) -> None:
-    if not Path(path).is_file():
-        found = "is a folder" if Path(path).is_dir() else "is not there"
-        raise InputError(f"The {what} {path} {found}: check the name.")
+    try:
+        mode = os.stat(path).st_mode
+    except (FileNotFoundError, NotADirectoryError):
+        raise InputError(f"The {what} {path} is not there: check the name.") from None
+    except OSError as error:
+        raise InputError(
+            f"The {what} {path} cannot be read ({error.strerror}): check the name and your rights."
+        ) from None
+    if stat.S_ISDIR(mode):
+        raise InputError(f"The {what} {path} is a folder: check the name.")
+    if not stat.S_ISREG(mode):
+        raise InputError(
+            f"The {what} {path} is a pipe or a device, which can be read only once: save it to a file first."
+        )
+    if not os.access(path, os.R_OK):
+        raise InputError(f"The {what} {path} cannot be read (Permission denied): check the name and your rights.")
 
 
 def _require_head_file(path) -> None:

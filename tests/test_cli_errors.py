@@ -80,6 +80,8 @@ def build(scan, landmarks, tmp_path):
         (["bake", "x.blend", "--set", "arkit", "-o", ""], "--output: the name is empty"),
         (["bake", "x.blend", "--performance", ""], "--performance: the name is empty"),
         (["sample", "-o", ""], "--output: the name is empty"),
+        (["build", "\udcff.ply", "-o", "x.blend"], "SCAN: the name '\\udcff.ply' is no text in UTF-8"),
+        (["build", "x.ply", "-o", "x.blend", "--name", "\udcff"], "--name: the name"),
         (["build", "x.ply", "-o", "x.blend", "--units", "miles"], "miles"),
         (["build", "x.ply", "-o", "x.blend", "--up", "w"], "choose from"),
         (["sample", "-o", "x", "--seed", "-1"], "whole number from 0"),
@@ -92,6 +94,19 @@ def test_a_wrong_command_is_one_sentence(capfd, tmp_path, arguments, word):
 
 def test_no_scan_there(capfd, tmp_path, landmarks):
     assert "nowhere.ply" in fails(capfd, tmp_path, *build(tmp_path / "nowhere.ply", landmarks(), tmp_path))
+
+
+def test_a_scan_or_head_that_is_no_file_or_cannot_be_read(capfd, tmp_path, monkeypatch):
+    """A pipe was said not to be there, and the rest to be our fault."""
+    monkeypatch.chdir(tmp_path)
+    for command in (("landmarks", "-o", "a.json"), ("export", "-o", "a.glb")):
+        assert "a folder" in fails(capfd, tmp_path, *command, ".")
+        assert "x.ply is not there" in fails(capfd, tmp_path, *command, "x.ply")
+        assert "is a pipe or a device" in fails(capfd, tmp_path, *command, os.devnull)
+        assert "cannot be read (File name too long)" in fails(capfd, tmp_path, *command, "x" * 256)
+    (tmp_path / "secret.blend").write_bytes(b"anything")
+    monkeypatch.setattr(os, "access", lambda path, mode: False)
+    assert "cannot be read (Permission denied)" in fails(capfd, tmp_path, "export", "secret.blend", "-o", "a.glb")
 
 
 def test_no_landmark_file_there(capfd, tmp_path, scan):

@@ -109,6 +109,28 @@ def test_whoever_reads_may_go(blender):
     assert (done.returncode, done.stderr) == (0, b"")
 
 
+@pytest.mark.skipif(os.name != "posix", reason="closes streams as shells there do")
+def test_closed_streams_get_nothing_of_blenders_chatter(bpy, reference, tmp_path):
+    """With stdout closed, stderr got what the exporter says, and a file that took its place would have, too."""
+    from headshop.headshop_addon import heads
+
+    heads.create_head(reference, "Fran")
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "head.blend"), copy=True)
+    command = f'"$0" -m headshop export {tmp_path / "head.blend"} -o {tmp_path / "head.glb"}'
+    for closed, printed in ((">&-", b""), ("<&- 2>&-", b"0 shapes\n"), (">&- 2>&-", b"")):
+        done = subprocess.run(["sh", "-c", f"{command} {closed}", sys.executable], capture_output=True)
+        assert done.returncode == 0 and done.stdout.endswith(printed) and done.stderr == b"", (closed, done)
+        assert bool(done.stdout) == bool(printed)
+        assert (tmp_path / "head.glb").read_bytes()[:4] == b"glTF"
+
+
+def test_a_tilde_that_the_shell_left_means_the_home_folder():
+    """``--export=~/plain`` made a folder called ~."""
+    asked = parser().parse_args(["bake", "~/head.blend", "-o", "./~", "--export=~/plain"])
+    assert [asked.head, asked.output, asked.export] == [*map(os.path.expanduser, ("~/head.blend", "./~", "~/plain"))]
+    assert "~" not in asked.export + asked.head and asked.output == "./~"
+
+
 def test_nothing_that_takes_long_is_imported_before_ctrl_c_is_quiet():
     code = "import sys, headshop.headshop_addon.command_line; sys.exit('numpy' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code]).returncode == 0
