@@ -15,7 +15,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from ..sim.errors import InputError
-from .quiet import patient
+from .quiet import ENDINGS, patient
 
 INTERRUPTED = 130
 RELAX = ("auto", "always", "never")
@@ -203,7 +203,7 @@ def _ending(argv, struck: list[int]) -> int:
 
 @contextmanager
 def _interruptible(struck: list[int]):
-    """Being told to end (SIGTERM, as by ``timeout`` or a shutdown) cleans up as Ctrl-C does; ``struck`` gets the signal."""
+    """Being told to end, or the terminal being closed, cleans up as Ctrl-C does; ``struck`` gets the signal."""
 
     def interrupt(number, _):
         struck.append(number)
@@ -211,8 +211,10 @@ def _interruptible(struck: list[int]):
 
     before = {}
     try:
-        for number in (signal.SIGINT, signal.SIGTERM):
-            if number == signal.SIGTERM or callable(signal.getsignal(number)):  # Blender's own Ctrl-C is left alone
+        for number in ENDINGS:
+            handler = signal.getsignal(number)
+            # Blender's own Ctrl-C is left alone, and who runs under nohup does not mind the terminal
+            if number == signal.SIGTERM or callable(handler) or (number != signal.SIGINT and handler == signal.SIG_DFL):
                 before[number] = signal.signal(number, interrupt)
     except ValueError:  # not the main thread: no signals arrive here
         yield

@@ -11,6 +11,9 @@ import sys
 import tempfile
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 
+#: Ctrl-C, being told to end (as by ``timeout`` or a shutdown), and the terminal being closed, which Windows has not.
+ENDINGS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
+
 
 @contextmanager
 def quiet():
@@ -27,7 +30,7 @@ def patient():
     """Ctrl-C and the like take effect at the end instead of in the middle."""
     struck, before = [], {}
     try:
-        for number in (signal.SIGINT, signal.SIGTERM):
+        for number in ENDINGS:
             if callable(signal.getsignal(number)):  # a handler of Python's; Blender's own are left alone
                 before[number] = signal.signal(number, lambda number, _: struck.append(number))
     except ValueError:  # not the main thread: no signals arrive here

@@ -3,7 +3,6 @@
 
 import json
 import os
-import signal
 import subprocess
 import sys
 import time
@@ -13,6 +12,7 @@ import pytest
 from scipy.spatial import ConvexHull
 
 from headshop.headshop_addon.command_line import main
+from headshop.headshop_addon.quiet import ENDINGS
 from headshop.sim.anatomy.head import Head
 from headshop.sim.mesh import Mesh
 from headshop.sim.scan.ply import write_ply
@@ -226,7 +226,7 @@ def test_nothing_to_bake(capfd, tmp_path):
     assert "--performance" in fails(capfd, tmp_path, "bake", head, "--set", "arkit", "--dynamic")
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", ENDINGS)
 def test_ctrl_c_in_the_middle(blender, tmp_path, scan, landmarks, number):
     given = landmarks()
     before = sorted(tmp_path.rglob("*"))

@@ -10,7 +10,7 @@ import sys
 
 import pytest
 
-from headshop.headshop_addon.command_line import main, parser
+from headshop.headshop_addon.command_line import _interruptible, main, parser
 from headshop.headshop_addon.progress_bar import progress_bar
 from headshop.headshop_addon.quiet import quiet
 from headshop.sim.landmarks.find import FoundLandmarks
@@ -129,6 +129,23 @@ def test_a_tilde_that_the_shell_left_means_the_home_folder():
     asked = parser().parse_args(["bake", "~/head.blend", "-o", "./~", "--export=~/plain"])
     assert [asked.head, asked.output, asked.export] == [*map(os.path.expanduser, ("~/head.blend", "./~", "~/plain"))]
     assert "~" not in asked.export + asked.head and asked.output == "./~"
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGHUP"), reason="has no terminals that hang up")
+def test_under_nohup_the_terminal_may_be_closed(blender, tmp_path):
+    ran = []
+
+    def work():
+        signal.raise_signal(signal.SIGHUP)
+        ran.append(True)
+
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        with _interruptible(ran):
+            work()
+    finally:
+        signal.signal(signal.SIGHUP, before)
+    assert ran == [True]
 
 
 def test_nothing_that_takes_long_is_imported_before_ctrl_c_is_quiet():
