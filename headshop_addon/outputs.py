@@ -143,9 +143,11 @@ class Outputs:
             missing.append(folder)
             folder = folder.parent
         for each in reversed(missing):
-            if not each.exists():  # as that above a folder that was missing, a/.., by now
+            try:
                 each.mkdir()
-                self._made.append(each)
+            except FileExistsError:
+                continue  # by now: another run made it, or it is what a folder that was missing lies in, a/..
+            self._made.append(each)
 
 
 @contextmanager

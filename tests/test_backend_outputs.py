@@ -3,6 +3,7 @@
 
 import errno
 import os
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -119,6 +120,24 @@ def test_names_too_long_or_through_what_is_not_there(tmp_path, monkeypatch):
         with Outputs((longest,)) as outputs:
             outputs.file(path).write_text("new")
         assert path.read_text() == "new"
+
+
+def test_two_runs_may_make_the_same_folder_at_once(tmp_path, monkeypatch):
+    """The second was told that nothing can be written to a folder that exists."""
+    make = Path.mkdir
+
+    def late(path):
+        os.mkdir(path)  # the other run's
+        make(path)
+
+    monkeypatch.setattr(Path, "mkdir", late)
+    with Outputs() as outputs:
+        outputs.file(tmp_path / "new" / "deep" / "a.txt").write_text("a")
+    assert (tmp_path / "new" / "deep" / "a.txt").read_text() == "a"
+    with pytest.raises(KeyboardInterrupt), Outputs() as outputs:
+        outputs.file(tmp_path / "theirs" / "a.txt").write_text("half")
+        raise KeyboardInterrupt
+    assert (tmp_path / "theirs").is_dir() and not list((tmp_path / "theirs").iterdir())
 
 
 def test_a_full_disk_is_told_with_the_name_that_was_given(tmp_path, monkeypatch):
