@@ -6,6 +6,7 @@ from pathlib import Path
 
 import bpy
 
+from ..sim.anatomy.storage import write_atomically
 from ..sim.detail.detail_map import DetailMaps
 from ..sim.detail.files import displacement_png, normal_png
 from ..sim.progress import Progress, Work, finish
@@ -40,12 +41,12 @@ def packing(skin: bpy.types.Object, maps: DetailMaps) -> Work:
 
 def _packed(name: str, data: bytes) -> bpy.types.Image:
     with tempfile.TemporaryDirectory(prefix="headshop-") as folder:
-        path = Path(folder) / f"{name.replace('/', '_')}.png"
-        path.write_bytes(data)
+        path = Path(folder) / "detail.png"  # not after the head, whose name may be too long for a file's
+        write_atomically(path, data)
         image = bpy.data.images.load(str(path), check_existing=False)
         image.colorspace_settings.name = "Non-Color"
         image.pack()
-        image.filepath_raw = f"//{path.name}"  # where it would be unpacked to
+        image.filepath_raw = f"//{name.replace('/', '_')}.png"  # where it would be unpacked to
     image.name = name
     return image
 
@@ -57,11 +58,11 @@ def images_of(skin: bpy.types.Object) -> DetailImages | None:
 
 
 def write_files(skin: bpy.types.Object, folder) -> None:
-    """Write the head's packed detail images into a folder as they are."""
+    """Write the head's packed detail images into a folder as they are. Raises `InputError` if they cannot be written."""
     for key, (_, name) in IMAGES.items():
         image = skin.get(key)
         if isinstance(image, bpy.types.Image) and image.packed_file is not None:
-            (Path(folder) / name).write_bytes(image.packed_file.data)
+            write_atomically(Path(folder) / name, image.packed_file.data)
 
 
 def show(skin: bpy.types.Object, mode: str) -> None:

@@ -11,7 +11,7 @@ from ..sim.errors import InputError
 from ..sim.progress import Progress, Work
 from . import heads
 from .outputs import Outputs
-from .pictures import grounded, read_picture, render_frame, write_picture
+from .pictures import grounded, read_drawn, render_frame, write_picture
 from .quiet import quiet
 from .studio import studio
 from .whole_files import require_whole
@@ -56,7 +56,7 @@ def render_movie(
                 done = (frame - first) / (last - first + 1)
                 yield Progress(0.97 * done, f"Rendering frame {frame} of {last}")
                 pictures.append(render_frame(scene, frame, folder))
-                write_picture(pictures[-1], grounded(read_picture(pictures[-1]), GROUND))
+                write_picture(pictures[-1], grounded(read_drawn(pictures[-1]), GROUND))
         yield Progress(0.97, "Writing the film")
         encode(pictures, target, size, fps, base)
     return path

@@ -8,6 +8,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
+from ..sim.errors import InputError
 from .quiet import quiet
 from .whole_files import require_whole
 
@@ -23,6 +24,23 @@ def read_picture(path) -> np.ndarray:
     finally:
         bpy.data.images.remove(image)
     return pixels.reshape(height, width, 4)[::-1].copy()
+
+
+def read_drawn(path: Path) -> np.ndarray:
+    """`read_picture` of what Blender has just drawn into a folder of its own for temporary files.
+
+    Raises
+    ------
+    InputError : not all of it was written; Blender does not tell.
+    """
+    try:
+        require_whole(path)
+    except InputError:
+        where = path.parent.parent
+        raise InputError(
+            f"Pictures cannot be drawn in {where}, the folder for temporary files: is the disk full?"
+        ) from None
+    return read_picture(path)
 
 
 def write_picture(path, pixels: np.ndarray) -> None:
@@ -71,7 +89,7 @@ def render_picture(scene) -> np.ndarray:
         scene.render.filepath = str(Path(folder) / "still.png")
         with quiet():
             bpy.ops.render.render(write_still=True, scene=scene.name)
-        return read_picture(scene.render.filepath)
+        return read_drawn(Path(scene.render.filepath))
 
 
 def grounded(picture: np.ndarray, colour) -> np.ndarray:

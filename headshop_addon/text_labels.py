@@ -10,7 +10,7 @@ import bpy
 import imbuf
 import numpy as np
 
-from .pictures import read_picture
+from .pictures import read_drawn
 
 _FINER = 3  # text is drawn larger and averaged down: Blender's own smoothing snaps strokes to whole pixels
 
@@ -46,7 +46,7 @@ def text_mask(text: str, size: float) -> np.ndarray:
         path = Path(folder) / "text.png"
         imbuf.write(buffer, filepath=str(path))
         buffer.free()
-        drawn = read_picture(path)[..., 3]
+        drawn = read_drawn(path)[..., 3]
     return drawn.reshape(height, _FINER, width, _FINER).mean(axis=(1, 3))
 
 

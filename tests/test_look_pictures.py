@@ -232,7 +232,7 @@ def test_a_full_disk_leaves_no_half_of_a_picture_or_film(blender, tmp_path):
 import resource, signal
 from pathlib import Path
 import bpy, numpy as np
-from headshop.headshop_addon import movie, pictures
+from headshop.headshop_addon import movie, pictures, text_labels
 from headshop.sim.errors import InputError
 
 folder, noise = Path({str(tmp_path)!r}), np.random.default_rng(0)
@@ -245,6 +245,7 @@ resource.setrlimit(resource.RLIMIT_FSIZE, (20000, resource.getrlimit(resource.RL
 for write in (
     lambda: movie.encode(frames, folder / "half.mp4", (128, 128), 24),
     lambda: pictures.write_picture(folder / "half.png", noise.random((256, 256, 4))),
+    lambda: text_labels.text_mask("What a full disk cuts off", 400.0),
     lambda: pictures.write_picture(folder / "nowhere" / "half.png", noise.random((256, 256, 4))),
 ):
     try:
@@ -256,6 +257,16 @@ for write in (
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
+
+
+def test_detail_of_a_head_with_a_long_name_is_packed(bpy, tmp_path):
+    """The name of a file was made of it, which was too long."""
+    from headshop.headshop_addon import detail_images
+    from headshop.headshop_addon.pictures import write_picture
+
+    write_picture(tmp_path / "flat.png", np.ones((4, 4, 4)))
+    image = detail_images._packed("a/b" + 250 * "x" + " Normal", (tmp_path / "flat.png").read_bytes())
+    assert image.packed_file is not None and image.filepath_raw.startswith("//a_bx")
 
 
 def test_text_is_drawn_where_it_is_asked_for(bpy):
