@@ -237,8 +237,8 @@ def _die_by(struck: list[int]) -> None:
 
 
 def _open_streams() -> None:
-    """Open what is closed of stdin, stdout and stderr onto nothing: the next file opened would take its number, and get what
-    Blender prints."""
+    """Open what is closed of stdin, stdout and stderr onto nothing: the next file opened would take its number, and
+    get what Blender prints."""
     for number in range(3):
         try:
             os.fstat(number)

@@ -34,7 +34,8 @@ def require_few(frames: int) -> None:
     """Raise `InputError` for more frames than can be baked at once."""
     if frames > MOST:
         raise InputError(
-            f"{frames:,} frames are more than can be baked at once: bake {MOST:,} or fewer, at a lower frame rate or in parts."
+            f"{frames:,} frames are more than can be baked at once: bake {MOST:,} or fewer, at a lower frame rate or in "
+            "parts."
         )
 
 

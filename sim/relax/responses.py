@@ -71,7 +71,12 @@ class Responses:
 
 @lru_cache(maxsize=1)
 def responses(path=TABLE) -> Responses:
-    """The table, with the right side's muscles mirrored from the left's. Raises `InputError` where ``path`` cannot be read."""
+    """The table, with the right side's muscles mirrored from the left's.
+
+    Raises
+    ------
+    InputError : ``path`` cannot be read.
+    """
     with np.load(io.BytesIO(file_bytes(path)), allow_pickle=False) as table:
         jaw, fields, smile = (table[name].astype(float) for name in ("jaw", "fields", "smile"))
         return Responses(*both_sides(fields, table["mirror"]), jaw, smile)

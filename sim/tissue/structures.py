@@ -218,7 +218,8 @@ def require_control(control) -> None:
     """Raise `InputError` unless ``control`` is a `Control`."""
     if not isinstance(control, Control):
         raise InputError(
-            f"The control is given as {type(control).__name__}: give a Control, which pose.control makes of a model and a Pose."
+            f"The control is given as {type(control).__name__}: give a Control, which pose.control makes of a model and a "
+            "Pose."
         )
 
 
