@@ -144,7 +144,7 @@ class Job:
         text = f"{self.bl_label}: {step.label}, {running.fraction:.0%}    |    Esc: cancel"
         for window in context.window_manager.windows:
             window.workspace.status_text_set(text)
-        for area in _viewports(context):
+        for area in viewports(context):
             for region in area.regions:
                 if region.type == "UI":  # the sidebar alone: drawing a big scan anew at every step takes its time
                     region.tag_redraw()
@@ -160,7 +160,7 @@ class Job:
             self._timer = None
         for window in context.window_manager.windows:
             window.workspace.status_text_set(None)
-        for area in _viewports(context):
+        for area in viewports(context):
             area.tag_redraw()
 
 
@@ -189,7 +189,7 @@ class FileJob(Job):
         return {"CANCELLED"}  # this call did nothing itself: no step to undo
 
 
-def _viewports(context):
+def viewports(context):
     """Every 3D viewport of every window."""
     areas = (area for window in context.window_manager.windows for area in window.screen.areas)
     return [area for area in areas if area.type == "VIEW_3D"]

@@ -7,13 +7,15 @@ from statistics import median
 from bpy_extras.view3d_utils import region_2d_to_origin_3d, region_2d_to_vector_3d
 
 
-def viewport_region(area, x: int, y: int):
-    """The 3D region of ``area`` under a window position, or None: elsewhere, or over a header, sidebar or toolbar."""
+def viewport_region(screen, x: int, y: int):
+    """The 3D region under a window position, of any viewport of ``screen``, or None: elsewhere, or over a header, sidebar or
+    toolbar."""
 
     def holds(region):
         return region.x <= x < region.x + region.width and region.y <= y < region.y + region.height
 
-    inside = [region for region in area.regions if region.width > 1 and region.height > 1 and holds(region)]
+    regions = [region for area in screen.areas if area.type == "VIEW_3D" for region in area.regions]
+    inside = [region for region in regions if region.width > 1 and region.height > 1 and holds(region)]
     if any(region.type != "WINDOW" for region in inside):
         return None
     return inside[0] if inside else None
@@ -27,13 +29,13 @@ _RINGS = (5.0, 10.0, 18.0)
 _LAYERS, _BEHIND = 8, 1e-5
 
 
-def on_surface(context, area, region, at, obj, specks=()):
-    """The point of ``obj``'s surface under a region position, in the object's own space; None where there is none.
+def on_surface(context, region, at, obj, specks=()):
+    """The point of ``obj``'s surface under a position in a 3D region, in the object's own space; None where there is none.
 
     In a hole it is the point under the mouse at the depth of the hole's rim: a landmark may lie in mid-air.
     specks : (n,) bool, vertices (`sim.scan.specks`) that a click passes by
     """
-    view = area.spaces.active.region_3d
+    view = region.data  # in a quad view each region has a view of its own
     to_local = obj.matrix_world.inverted_safe()
     turn = to_local.to_3x3()
     graph = context.evaluated_depsgraph_get()

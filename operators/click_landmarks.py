@@ -3,13 +3,14 @@
 
 import bpy
 
-from ..headshop_addon import active, bridge, heads, landmark_overlay, picking, polls
+from ..headshop_addon import active, bridge, heads, jobs, landmark_overlay, picking, polls
 from ..headshop_addon import scan_landmarks as landmarks
 from ..headshop_addon.bridge import METRES
 from ..sim.anatomy.landmark_names import label
 
 _SKIP = {"RIGHTMOUSE", "N"}
 _LEAVE_OUT = {"X", "DEL"}  # by which Blender deletes the selected objects
+_WORKSPACE = {"PAGE_UP", "PAGE_DOWN"}  # with Ctrl another one is shown; what the status bar says would stay in this one
 _END = {"ESC", "RET", "NUMPAD_ENTER"}
 
 
@@ -46,7 +47,6 @@ class HEADSHOP_OT_click_landmarks(bpy.types.Operator):
             return {"CANCELLED"}
         from ..sim.scan.specks import specks
 
-        self._area = context.area
         self._scan = active.scan(context)
         self._specks = specks(bridge.object_to_mesh(self._scan))
         self._steps = []
@@ -58,6 +58,12 @@ class HEADSHOP_OT_click_landmarks(bpy.types.Operator):
             return {"CANCELLED"}
         context.scene.headshop.show_landmarks = True
         self._show_alone(context)
+        if not self._can_go_on(context):
+            self._finish(context)
+            self.report({"ERROR"}, f"{self._scan.name} is in a collection that is hidden or excluded: show that first.")
+            return {"CANCELLED"}
+        if context.space_data.local_view:
+            self._scan.local_view_set(context.space_data, True)
         context.window.cursor_modal_set("CROSSHAIR")
         context.window_manager.modal_handler_add(self)
         self._ask(context)
@@ -67,15 +73,17 @@ class HEADSHOP_OT_click_landmarks(bpy.types.Operator):
         """Click places, Ctrl-Z takes back, N or the right button skips, X leaves out, Esc or Enter ends; the view can turn."""
         if not self._can_go_on(context):
             self._finish(context)
-            self.report({"WARNING"}, "Clicking landmarks has ended: the scan is gone, or being edited.")
+            self.report({"WARNING"}, "Clicking landmarks has ended: the scan is gone, hidden, or being edited.")
             return {"FINISHED"}
         if event.type in _END and event.value == "PRESS":
             return self._end(context)
+        if event.type in _WORKSPACE and event.ctrl and event.value == "PRESS":
+            return self._end(context) | {"PASS_THROUGH"}
         if event.type == "Z" and (event.ctrl or event.oskey) and event.value == "PRESS":
             self._take_back(context)
             return {"RUNNING_MODAL"}
         if event.type == "LEFTMOUSE" and event.value in {"PRESS", "DOUBLE_CLICK"}:
-            region = picking.viewport_region(self._area, event.mouse_x, event.mouse_y)
+            region = picking.viewport_region(context.screen, event.mouse_x, event.mouse_y)
             if (
                 region is None
             ):  # the artist has turned to a button: keep what there is and let the button have its click
@@ -114,14 +122,17 @@ class HEADSHOP_OT_click_landmarks(bpy.types.Operator):
             bpy.data.objects[name].hide_viewport = True
 
     def _can_go_on(self, context) -> bool:
-        """Whether the scan is still there, as an object."""
+        """Whether the scan can be seen, as an object."""
+        return context.mode == "OBJECT" and self._is_there(context) and self._scan.visible_get()
+
+    def _is_there(self, context) -> bool:
         try:
-            return context.mode == "OBJECT" and context.scene.objects.get(self._scan.name) == self._scan
+            return context.scene.objects.get(self._scan.name) == self._scan
         except ReferenceError:
             return False
 
     def _click(self, context, region, at):
-        hit = picking.on_surface(context, self._area, region, at, self._scan, self._specks)
+        hit = picking.on_surface(context, region, at, self._scan, self._specks)
         if hit is None:
             self.report({"WARNING"}, "Click on the scan, or skip this landmark with N.")
             return {"RUNNING_MODAL"}
@@ -147,21 +158,25 @@ class HEADSHOP_OT_click_landmarks(bpy.types.Operator):
             return self._end(context)
         landmark_overlay.asked_for = self._name
         count = len(landmarks.positions(self._scan))
-        self._area.header_text_set(f"Click {self._name}: {label(self._name)}   ({count} placed)")
+        self._say_above(context, f"Click {self._name}: {label(self._name)}   ({count} placed)")
         keys = "N or right click: skip   |   X: leave out   |   Ctrl Z: take back   |   Esc or Enter: end and keep"
         context.workspace.status_text_set(f"Click {self._name}   |   {keys}")
-        self._area.tag_redraw()
         return {"RUNNING_MODAL"}
+
+    def _say_above(self, context, text):
+        """In the headers of all viewports: one may be maximised, split or closed while landmarks are clicked."""
+        for area in jobs.viewports(context):
+            area.header_text_set(text)
+            area.tag_redraw()
 
     def _finish(self, context):
         for name in self._covered:
             if name in bpy.data.objects:
                 bpy.data.objects[name].hide_viewport = False
-        if self._covered and self._can_go_on(context):
+        if self._covered and self._is_there(context):
             self._scan.hide_viewport = self._hidden
         landmark_overlay.asked_for = ""
-        self._area.header_text_set(None)
-        self._area.tag_redraw()
+        self._say_above(context, None)
         context.workspace.status_text_set(None)
         context.window.cursor_modal_restore()
 

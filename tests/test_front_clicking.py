@@ -17,7 +17,6 @@ def clicks(addon, scan_object):
     out = type("Clicks", (), methods)()
     out.said = []
     out.report = lambda kind, text: out.said.append(text)
-    out._area = SimpleNamespace(header_text_set=lambda _: None, tag_redraw=lambda: None)
     out._scan, out._steps, out._skipped, out._chosen, out.start = scan_object, [], [], None, ""
     return out
 
@@ -26,9 +25,21 @@ def clicks(addon, scan_object):
 def context(addon):
     """Blender's context with a window that shows nothing."""
     nothing = SimpleNamespace(cursor_modal_restore=lambda: None, status_text_set=lambda _: None)
-    there = addon.context
+    there, area = (
+        addon.context,
+        SimpleNamespace(type="VIEW_3D", header_text_set=lambda _: None, tag_redraw=lambda: None),
+    )
+    screen = SimpleNamespace(areas=[area])
     return SimpleNamespace(
-        scene=there.scene, mode="OBJECT", window=nothing, workspace=nothing, view_layer=there.view_layer
+        scene=there.scene,
+        mode="OBJECT",
+        area=area,
+        screen=screen,
+        space_data=SimpleNamespace(local_view=None),
+        window=nothing,
+        window_manager=SimpleNamespace(windows=[SimpleNamespace(screen=screen)]),
+        workspace=nothing,
+        view_layer=there.view_layer,
     )
 
 
@@ -88,6 +99,24 @@ def test_clicking_ends_where_the_scan_is_deleted_or_edited(clicks, context, addo
     context.mode = "OBJECT"
     addon.data.objects.remove(clicks._scan)
     assert clicks.modal(context, _press("LEFTMOUSE")) == {"FINISHED"} and len(clicks.said) == 2
+
+
+def test_clicking_ends_where_the_scan_is_hidden_and_when_another_workspace_is_shown(clicks, context):
+    clicks._before, clicks._covered, clicks._name = None, [], "prn"
+    assert clicks.modal(context, _press("PAGE_DOWN", ctrl=True)) == {"FINISHED", "PASS_THROUGH"}
+    assert clicks.modal(context, _press("PAGE_DOWN")) == {"PASS_THROUGH"}
+    clicks._scan.hide_set(True)
+    assert clicks.modal(context, _press("LEFTMOUSE")) == {"FINISHED"} and "hidden" in clicks.said[-1]
+
+
+def test_a_scan_in_an_excluded_collection_is_not_clicked(clicks, context, addon):
+    collection, top = addon.data.collections.new("Scans"), context.scene.collection
+    top.children.link(collection)
+    top.objects.unlink(clicks._scan)
+    collection.objects.link(clicks._scan)
+    context.view_layer.layer_collection.children["Scans"].exclude = True
+    assert clicks.invoke(context, _press("LEFTMOUSE")) == {"CANCELLED"}
+    assert clicks.said == [f"{clicks._scan.name} is in a collection that is hidden or excluded: show that first."]
 
 
 def test_it_does_not_begin_in_edit_mode(addon, scan_object):

@@ -11,7 +11,7 @@ SIDE = 0.2  # m seen across the view
 
 @pytest.fixture
 def view(bpy):
-    """An orthographic view from the front, 200 pixels for `SIDE`: (area, region)."""
+    """An orthographic view from the front, 200 pixels for `SIDE`."""
     from mathutils import Matrix
 
     turn = Matrix.Rotation(np.pi / 2, 4, "X")  # from Blender's camera axes to a camera that looks along +Y
@@ -19,8 +19,7 @@ def view(bpy):
     window = Matrix.Diagonal((2 / SIDE, 2 / SIDE, -0.01, 1))
     rv3d = SimpleNamespace(view_matrix=looking, perspective_matrix=window @ looking, is_perspective=False)
     rv3d.view_perspective = "ORTHO"
-    area = SimpleNamespace(spaces=SimpleNamespace(active=SimpleNamespace(region_3d=rv3d)))
-    return area, SimpleNamespace(width=200, height=200)
+    return SimpleNamespace(width=200, height=200, data=rv3d)
 
 
 @pytest.fixture
@@ -55,7 +54,7 @@ def scan(bpy):
 def test_a_click_lands_on_the_scan_or_over_its_hole(bpy, view, scan, at, expected):
     from headshop.headshop_addon import picking
 
-    point = picking.on_surface(bpy.context, *view, at, scan)
+    point = picking.on_surface(bpy.context, view, at, scan)
     assert (point is None) == (expected is None)
     if expected is not None:
         assert tuple(point) == pytest.approx(expected, abs=1e-4)
@@ -67,7 +66,7 @@ def test_a_scan_turned_inside_out_is_hit_all_the_same(bpy, view, scan):
     scan.data.flip_normals()
     scan.data.update()
     bpy.context.view_layer.update()
-    point = picking.on_surface(bpy.context, *view, (151, 121), scan)
+    point = picking.on_surface(bpy.context, view, (151, 121), scan)
     assert tuple(point) == pytest.approx((0.051, -0.1, 0.021), abs=1e-4)
 
 
@@ -77,7 +76,7 @@ def test_a_moved_and_scaled_scan_is_hit_in_its_own_space(bpy, view, scan):
     scan.scale = (2, 2, 2)
     scan.location = (0.02, 0.0, 0.0)
     bpy.context.view_layer.update()
-    point = picking.on_surface(bpy.context, *view, (151, 121), scan)
+    point = picking.on_surface(bpy.context, view, (151, 121), scan)
     assert tuple(point) == pytest.approx((0.0155, -0.1, 0.0105), abs=1e-4)
 
 
@@ -97,9 +96,9 @@ def test_a_speck_before_the_face_is_clicked_through(bpy, view, scan):
     bpy.context.view_layer.update()
     found = specks(mesh)
     assert found[-6:].all() and not found[whole.triangles].any()
-    point = picking.on_surface(bpy.context, *view, (151, 121), dirty, found)
+    point = picking.on_surface(bpy.context, view, (151, 121), dirty, found)
     assert tuple(point) == pytest.approx((0.051, -0.1, 0.021), abs=1e-4)
-    point = picking.on_surface(bpy.context, *view, (151, 121), dirty)
+    point = picking.on_surface(bpy.context, view, (151, 121), dirty)
     assert point[1] == pytest.approx(-0.125, abs=1e-4)
     assert not specks(Mesh(dirt, faces - (faces >= 0) * count)).any(), "a scan of specks alone keeps them"
 
@@ -110,8 +109,22 @@ def test_clicks_on_the_sidebar_are_not_clicks_on_the_scan(blender):
     window = SimpleNamespace(type="WINDOW", x=0, y=0, width=1000, height=800)
     sidebar = SimpleNamespace(type="UI", x=800, y=0, width=200, height=800)
     closed = SimpleNamespace(type="TOOLS", x=0, y=0, width=1, height=800)
-    area = SimpleNamespace(regions=[closed, sidebar, window])
-    assert picking.viewport_region(area, 400, 300) is window
-    assert picking.viewport_region(area, 0, 300) is window
-    assert picking.viewport_region(area, 900, 300) is None
-    assert picking.viewport_region(area, 400, 900) is None
+    area = SimpleNamespace(type="VIEW_3D", regions=[closed, sidebar, window])
+    screen = SimpleNamespace(areas=[area])
+    assert picking.viewport_region(screen, 400, 300) is window
+    assert picking.viewport_region(screen, 0, 300) is window
+    assert picking.viewport_region(screen, 900, 300) is None
+    assert picking.viewport_region(screen, 400, 900) is None
+
+
+def test_a_click_counts_in_any_viewport_and_in_each_view_of_four(blender):
+    from headshop.headshop_addon import picking
+
+    four = [SimpleNamespace(type="WINDOW", x=x, y=y, width=500, height=400) for x in (0, 500) for y in (0, 400)]
+    beside = SimpleNamespace(type="WINDOW", x=1000, y=0, width=500, height=800)
+    below = SimpleNamespace(type="WINDOW", x=0, y=800, width=1500, height=100)
+    areas = [("OUTLINER", [below]), ("VIEW_3D", four), ("VIEW_3D", [beside])]
+    screen = SimpleNamespace(areas=[SimpleNamespace(type=kind, regions=regions) for kind, regions in areas])
+    for region in (*four, beside):
+        assert picking.viewport_region(screen, region.x + 10, region.y + 10) is region
+    assert picking.viewport_region(screen, 10, 810) is None
