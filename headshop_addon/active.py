@@ -19,6 +19,11 @@ def other_scan(context) -> bpy.types.Object | None:
     return there if is_scan and there.select_get() and there != scan(context) else None
 
 
+def is_foreign(scan) -> bool:
+    """Whether a scan was linked, overridden or not: of its landmarks Blender saves nothing with this file."""
+    return scan.library is not None or scan.override_library is not None
+
+
 def scans(context) -> list[bpy.types.Object]:
     """All scans in the scene."""
     return [obj for obj in context.scene.objects if obj.get(heads.PART) == "scan"]

@@ -6,6 +6,9 @@ from . import active, dependencies
 #: Why a head that was linked does not move, and what to do.
 LINKED = "This head is linked from another file: press Override Head in the panel Muscles first"
 
+#: Why landmarks cannot be placed on a scan that was linked: Blender saves none of them with this file.
+SCAN_LINKED = "This scan is linked from another file: make it local first (Object, Relations, Make Local)"
+
 
 def library(cls, name: str) -> bool:
     """A Python library is there."""
@@ -27,6 +30,16 @@ def scan(cls, context) -> bool:
     """There is a scan."""
     if active.scan(context) is None:
         cls.poll_message_set("Import a scan first")
+        return False
+    return True
+
+
+def own_scan(cls, context) -> bool:
+    """There is a scan, and this file keeps what is placed on it."""
+    if not scan(cls, context):
+        return False
+    if active.is_foreign(active.scan(context)):
+        cls.poll_message_set(SCAN_LINKED)
         return False
     return True
 

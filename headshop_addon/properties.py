@@ -82,12 +82,12 @@ def _on_fit_range(group, _context):
         heat_map.paint(group.id_data, group.fit_range)
 
 
-def _is_scan(_scene, obj):
-    return obj.type == "MESH" and obj.get(heads.PART, "scan") == "scan"
+def _is_scan(group, obj):
+    return obj.type == "MESH" and obj.get(heads.PART) == "scan" and obj.name in group.id_data.objects
 
 
-def _is_skin(_scene, obj):
-    return heads.is_skin(obj)
+def _is_skin(group, obj):
+    return heads.is_skin(obj) and obj.name in group.id_data.objects
 
 
 class HEADSHOP_PG_landmark(bpy.types.PropertyGroup):
@@ -224,7 +224,10 @@ class HEADSHOP_PG_scene(bpy.types.PropertyGroup):
     """Settings of the sidebar."""
 
     scan: PointerProperty(
-        name="Scan", description="The scan that landmarks are placed on", type=bpy.types.Object, poll=_is_scan
+        name="Scan",
+        description="The scan that landmarks are placed on. Use Selected makes one of other meshes",
+        type=bpy.types.Object,
+        poll=_is_scan,
     )
     head: PointerProperty(
         name="Head", description="The head that sliders and bakes work on", type=bpy.types.Object, poll=_is_skin

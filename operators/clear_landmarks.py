@@ -30,7 +30,7 @@ class HEADSHOP_OT_clear_landmarks(Simple, bpy.types.Operator):
     @classmethod
     def poll(cls, context):
         """Needs landmarks."""
-        if not polls.scan(cls, context):
+        if not polls.own_scan(cls, context):
             return False
         if not scan_landmarks.positions(active.scan(context), "PLACED", "FOUND", "DERIVED"):
             cls.poll_message_set("There are no landmarks yet")

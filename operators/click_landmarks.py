@@ -33,7 +33,7 @@ class HEADSHOP_OT_click_landmarks(bpy.types.Operator):
     @classmethod
     def poll(cls, context):
         """Needs a scan and the warp."""
-        return polls.scan(cls, context) and polls.library(cls, "scipy") and polls.object_mode(cls, context)
+        return polls.own_scan(cls, context) and polls.library(cls, "scipy") and polls.object_mode(cls, context)
 
     def execute(self, context):
         """Clicking needs a window."""

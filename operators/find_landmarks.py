@@ -18,7 +18,7 @@ class HEADSHOP_OT_find_landmarks(Job, bpy.types.Operator):
     @classmethod
     def poll(cls, context):
         """Needs a scan that is not being edited."""
-        return polls.library(cls, "scipy") and polls.scan(cls, context) and polls.object_mode(cls, context)
+        return polls.library(cls, "scipy") and polls.own_scan(cls, context) and polls.object_mode(cls, context)
 
     def work(self, context):
         """Look for the face in the scan's mesh."""

@@ -21,7 +21,7 @@ class HEADSHOP_OT_load_landmarks(Simple, ImportHelper, bpy.types.Operator):
     @classmethod
     def poll(cls, context):
         """Needs a scan and the warp."""
-        return polls.library(cls, "scipy") and polls.scan(cls, context)
+        return polls.library(cls, "scipy") and polls.own_scan(cls, context)
 
     def act(self, context):
         """Read, turn into the scan's place, store."""

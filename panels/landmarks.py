@@ -3,7 +3,7 @@
 
 import bpy
 
-from ..headshop_addon import active, scan_landmarks
+from ..headshop_addon import active, polls, scan_landmarks
 from ..sim.anatomy.landmark_names import LABELS, SKIN, label
 from .common import SidebarPanel, hint, progress
 
@@ -47,7 +47,9 @@ class HEADSHOP_PT_landmarks(SidebarPanel, bpy.types.Panel):
         row.operator("headshop.save_landmarks", text="Save", icon="FILE_TICK")
         row.operator("headshop.clear_landmarks", text="Clear", icon="TRASH")
         found = len(scan_landmarks.positions(scan, "FOUND"))
-        if found:
+        if active.is_foreign(scan):
+            hint(layout, context, polls.SCAN_LINKED + ".", "ERROR")
+        elif found:
             hint(layout, context, _counted(scan), "CHECKMARK")
             _advise(layout, context, scan)
         elif placed == 0:

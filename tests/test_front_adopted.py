@@ -211,3 +211,18 @@ def test_another_scan_is_chosen_with_its_landmarks(addon, scan_object, skin_obje
     assert active.scan(addon.context) == scan_object and not scan_object.hide_get()
     assert len(scan_landmarks.positions(scan_object)) == len(reference.landmark_positions())
     assert not addon.ops.headshop.choose_scan.poll() and len(active.scans(addon.context)) == 1
+
+
+def test_the_field_offers_the_scans_and_heads_of_this_scene(addon, skin_object, reference):
+    from headshop.headshop_addon import heads, properties
+
+    settings, mesh, scan = addon.context.scene.headshop, skin_object("Mesh"), skin_object("Scan")
+    scan[heads.PART] = "scan"
+    skin = next(filter(heads.is_skin, heads.create_head(reference, "Ref").objects))
+    offered = [
+        [obj for obj in addon.data.objects if poll(settings, obj)]
+        for poll in (properties._is_scan, properties._is_skin)
+    ]
+    assert mesh in list(addon.data.objects) and offered == [[scan], [skin]]
+    other = addon.data.scenes.new("Other").headshop
+    assert not any(properties._is_scan(other, obj) or properties._is_skin(other, obj) for obj in addon.data.objects)

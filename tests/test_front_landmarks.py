@@ -111,3 +111,29 @@ def test_landmarks_survive_saving_and_loading(addon, scan, reference, tmp_path):
     addon.ops.wm.save_as_mainfile(filepath=str(tmp_path / "scan.blend"))
     addon.ops.wm.open_mainfile(filepath=str(tmp_path / "scan.blend"))
     assert scan_landmarks.snapshot(addon.context.scene.headshop.scan) == before
+
+
+@pytest.mark.parametrize("overridden", [False, True])
+def test_landmarks_of_a_linked_scan_are_not_touched(addon, scan_object, reference, tmp_path, overridden):
+    from headshop.headshop_addon import scan_landmarks
+
+    scan_landmarks.replace(scan_object, reference.landmark_positions())
+    addon.ops.wm.save_as_mainfile(filepath=str(tmp_path / "scan.blend"))
+    addon.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    with addon.data.libraries.load(str(tmp_path / "scan.blend"), link=True) as (_, wanted):
+        wanted.objects = ["Scan"]
+    scene, scan = addon.context.scene, wanted.objects[0]
+    scene.collection.objects.link(scan)
+    if overridden:
+        scan = scan.override_create(remap_local_usages=True)
+    scene.headshop.scan = scan
+    buttons = [getattr(addon.ops.headshop, f"{name}_landmarks") for name in ("find", "click", "load", "clear")]
+    assert not any(button.poll() for button in buttons)
+    with pytest.raises(RuntimeError, match="linked from another file: make it local first"):
+        buttons[-1](name="prn")
+    assert addon.ops.headshop.build_head.poll()
+    addon.context.view_layer.objects.active = scan
+    scan.select_set(True)
+    addon.ops.object.make_local(type="SELECT_OBDATA")
+    assert all(button.poll() for button in buttons)
+    assert buttons[-1](name="prn") == {"FINISHED"} and len(scan_landmarks.to_build(scene.headshop.scan)) == 59
