@@ -22,6 +22,7 @@ MUSCLE = "headshop_muscle"
 COUNT = "headshop_vertices"
 SCAN = "headshop_scan"
 REPORT = "headshop_report"
+COLLECTION = "head"  # the part that is a head's collection
 _POINTERS = "headshop_objects"
 
 TITLES = {"eye_l": "Eye Left", "eye_r": "Eye Right", "teeth_upper": "Upper Teeth", "teeth_lower": "Lower Teeth"}
@@ -43,6 +44,7 @@ def create_head(
     """
     scene = scene or bpy.context.scene
     collection = bpy.data.collections.new(name)
+    collection[PART] = COLLECTION
     name = collection.name  # Blender may have numbered it
     scene.collection.children.link(collection)
     skin = _add_part(collection, head, "skin", name)
@@ -132,8 +134,30 @@ def skin_of(obj) -> bpy.types.Object | None:
 
 
 def head_collection(skin: bpy.types.Object) -> bpy.types.Collection | None:
-    """The collection that holds a head, or None if the skin lies loose in the scene."""
-    return next((c for c in skin.users_collection if c.name in bpy.data.collections), None)
+    """The collection that was made for a head, or None if none of its objects is in it any more."""
+    holders = (c for obj in (skin, *_objects_of(skin)) for c in obj.users_collection)
+    return next((c for c in holders if c.get(PART) == COLLECTION), None)
+
+
+def stands_with(skin: bpy.types.Object) -> list[bpy.types.Object]:
+    """What is seen where a head stands: its objects, what hangs on them and what lies in its collection; scans are not."""
+    collection = head_collection(skin)
+    beside = collection.all_objects if collection is not None else ()
+    return [
+        o for o in dict.fromkeys((skin, *skin.children_recursive, *_objects_of(skin), *beside)) if o.get(PART) != "scan"
+    ]
+
+
+def hide(skin: bpy.types.Object) -> None:
+    """Hide a head: its collection, and by themselves those of its objects that an artist keeps elsewhere."""
+    collection = head_collection(skin)
+    own = set()
+    if collection is not None:
+        collection.hide_viewport = collection.hide_render = True
+        own = {collection, *collection.children_recursive}
+    for obj in stands_with(skin):
+        if not own.issuperset(obj.users_collection):
+            obj.hide_viewport = obj.hide_render = True
 
 
 def head_name(skin: bpy.types.Object) -> str:

@@ -279,6 +279,5 @@ def _take_over(scene, scan, skin) -> None:
     if shown and heat_map.has_fit(skin):
         skin.headshop.show_fit = True
     for other in heads.built_from(scene, scan):
-        collection = heads.head_collection(other)
-        if other != skin and collection is not None:
-            collection.hide_viewport = collection.hide_render = True
+        if other != skin:
+            heads.hide(other)

@@ -114,10 +114,8 @@ class HEADSHOP_OT_click_landmarks(bpy.types.Operator):
         self._hidden = scan.hide_viewport
         scan.hide_viewport = False
         scan.hide_set(False)
-        collections = filter(None, map(heads.head_collection, heads.built_from(context.scene, scan)))
-        parts = [obj for collection in collections for obj in collection.all_objects]
-        # The scan itself may be among them.
-        self._covered = [obj.name for obj in parts if obj != scan and not obj.hide_viewport]
+        parts = [obj for skin in heads.built_from(context.scene, scan) for obj in heads.stands_with(skin)]
+        self._covered = [obj.name for obj in parts if not obj.hide_viewport]
         for name in self._covered:
             bpy.data.objects[name].hide_viewport = True
 

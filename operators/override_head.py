@@ -30,7 +30,7 @@ class HEADSHOP_OT_override_head(Simple, bpy.types.Operator):
             with context.temp_override(active_object=linked, object=linked, selected_objects=[linked]):
                 bpy.ops.object.make_override_library()
         elif linked.library is not None:
-            _override_collection(context, heads.head_collection(linked))
+            _override_collection(context, heads.head_collection(linked) or _first_collection(linked))
         else:
             before.discard(linked)
         found = [skin for skin in heads.find_heads(context.scene) if skin not in before and skin.override_library]
@@ -40,6 +40,11 @@ class HEADSHOP_OT_override_head(Simple, bpy.types.Operator):
             context.scene.headshop.head = context.view_layer.objects.active = found[0]
             found[0].select_set(True)
             return f"{heads.head_name(found[0])} can be moved and keyed in this file"
+
+
+def _first_collection(linked):
+    """Where a head lies whose own collection was dissolved."""
+    return next((c for c in linked.users_collection if c.name in bpy.data.collections), None)
 
 
 def _override_collection(context, collection) -> None:

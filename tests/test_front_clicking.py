@@ -68,6 +68,21 @@ def test_the_head_gives_way_to_its_scan_and_comes_back(clicks, context, referenc
     assert [obj.name for obj in collection.all_objects if obj.hide_viewport] == hidden + [clicks._scan.name]
 
 
+def test_what_an_artist_keeps_beside_a_head_stays_shown(clicks, context, reference, addon):
+    from headshop.headshop_addon import heads
+
+    made, hero = heads.create_head(reference, "Ref", clicks._scan), addon.data.collections.new("Hero")
+    skin, lamp = next(filter(heads.is_skin, made.objects)), addon.data.objects.new("Lamp", None)
+    context.scene.collection.children.link(hero)
+    made.objects.unlink(skin)
+    for obj in (skin, lamp):
+        hero.objects.link(obj)
+    clicks._show_alone(context)
+    assert skin.hide_viewport and not lamp.hide_viewport and clicks._scan.visible_get()
+    clicks._finish(context)
+    assert not skin.hide_viewport
+
+
 def test_a_scan_without_a_head_stays_shown(clicks, context):
     clicks._scan.hide_viewport = True
     clicks._show_alone(context)

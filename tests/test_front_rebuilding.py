@@ -45,6 +45,29 @@ def test_the_head_before_is_hidden_and_said_to_be(built, reference, capfd):
         assert not collection.hide_viewport and not collection.hide_render
 
 
+def test_a_head_that_an_artist_keeps_elsewhere_is_hidden_and_nothing_else(built, addon, scan_object):
+    from headshop.headshop_addon import heads
+
+    first, scene = built(), addon.context.scene
+    hero, lamp = addon.data.collections.new("Hero"), addon.data.objects.new("Lamp", None)
+    scene.collection.children.link(hero)
+    hero.objects.link(lamp)
+    heads.head_collection(first).objects.unlink(first)
+    hero.objects.link(first)
+    scan_object.hide_viewport = False
+    second = built()
+    addon.context.view_layer.update()
+    assert lamp.visible_get() and not hero.hide_viewport and not hero.hide_render
+    assert not any(obj.visible_get() for obj in heads.stands_with(first)) and first.hide_render
+    addon.data.collections.remove(heads.head_collection(second))  # as an artist dissolves it in the outliner
+    for obj in heads.parts_of(second).values():
+        scene.collection.objects.link(obj)
+    assert heads.head_collection(second) is None
+    third = built()
+    addon.context.view_layer.update()
+    assert third.visible_get() and lamp.visible_get() and not any(o.visible_get() for o in heads.stands_with(second))
+
+
 def test_the_fit_is_shown_of_the_new_head_where_it_was_of_the_other(built):
     from headshop.headshop_addon import heat_map
 
