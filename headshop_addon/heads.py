@@ -148,16 +148,27 @@ def stands_with(skin: bpy.types.Object) -> list[bpy.types.Object]:
     ]
 
 
-def hide(skin: bpy.types.Object) -> None:
-    """Hide a head: its collection, and by themselves those of its objects that an artist keeps elsewhere."""
+def hide(skin: bpy.types.Object, scene: bpy.types.Scene) -> None:
+    """Hide a head as the eyes of the outliner do, where an artist finds it: its collection, and by themselves those of its
+    objects that are kept elsewhere."""
     collection = head_collection(skin)
-    own = set()
-    if collection is not None:
-        collection.hide_viewport = collection.hide_render = True
-        own = {collection, *collection.children_recursive}
-    for obj in stands_with(skin):
-        if not own.issuperset(obj.users_collection):
-            obj.hide_viewport = obj.hide_render = True
+    own = {collection, *collection.children_recursive} if collection is not None else set()
+    elsewhere = [obj for obj in stands_with(skin) if not own.issuperset(obj.users_collection)]
+    for layer in scene.view_layers:
+        for shown in _below(layer.layer_collection):
+            shown.hide_viewport = shown.hide_viewport or shown.collection == collection
+        for obj in elsewhere:
+            if obj.name in layer.objects:
+                obj.hide_set(True, view_layer=layer)
+    for each in (collection, *elsewhere):
+        if each is not None:
+            each.hide_render = True
+
+
+def _below(shown: bpy.types.LayerCollection):
+    for child in shown.children:
+        yield child
+        yield from _below(child)
 
 
 def head_name(skin: bpy.types.Object) -> str:

@@ -107,10 +107,14 @@ class Job:
         if event.type != "TIMER":
             return {"RUNNING_MODAL"}
         try:
-            self._advance(context)
-            return {"RUNNING_MODAL"}
-        except StopIteration as stop:
-            return self._complete(context, stop.value)
+            try:
+                self._advance(context)
+                return {"RUNNING_MODAL"}
+            except StopIteration as stop:
+                return self._complete(context, stop.value)
+        except ReferenceError:
+            gone = "what it worked on was deleted or undone meanwhile, as another window lets one"
+            return self._fail(context, f"{self.bl_label} has ended: {gone}.")
         except (InputError, OSError) as error:
             return self._fail(context, sentence(error))
         except Exception as error:  # the modal handler must go, whatever happened

@@ -280,4 +280,4 @@ def _take_over(scene, scan, skin) -> None:
         skin.headshop.show_fit = True
     for other in heads.built_from(scene, scan):
         if other != skin:
-            heads.hide(other)
+            heads.hide(other, scene)

@@ -131,6 +131,23 @@ def test_our_own_fault_ends_the_job_too(window, capsys):
     assert "Traceback" in capsys.readouterr().err, "the console has the traceback"
 
 
+def test_what_was_deleted_meanwhile_is_said_to_be(window, capsys):
+    job = _job(2, ReferenceError("StructRNA of type Object has been removed"))
+    assert _run(job, window) == {"CANCELLED"}
+    assert job.said[0][1].startswith("Count has ended: what it worked on was deleted") and not capsys.readouterr().err
+
+
+@pytest.mark.parametrize("error", [ReferenceError, ZeroDivisionError])
+def test_a_fault_at_the_end_ends_the_job_too(window, error):
+    job = _job(2)
+
+    def finish(_context, _result):
+        raise error("at the end")
+
+    job.finish = finish
+    assert _run(job, window) == {"CANCELLED"} and job.said[0][0] == {"ERROR"}
+
+
 def test_only_one_job_at_a_time(window):
     first, second = _job(10**9), _job(1)
     first.invoke(window, None)

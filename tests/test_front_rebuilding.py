@@ -33,16 +33,23 @@ def built(addon, scan_object, reference, monkeypatch):
     return make
 
 
-def test_the_head_before_is_hidden_and_said_to_be(built, reference, capfd):
+def test_the_head_before_is_hidden_and_said_to_be(addon, built, reference, capfd):
     from headshop.headshop_addon import heads
 
     other = heads.create_head(reference, "Somebody")
     first, second = built(), built()
     said = capfd.readouterr().out
     assert "is hidden" in said and "check ch_r" in said
-    assert heads.head_collection(first).hide_viewport and heads.head_collection(first).hide_render
+    shown = addon.context.view_layer.layer_collection.children
+    old = heads.head_collection(first)
+    assert shown[old.name].hide_viewport and old.hide_render
     for collection in (heads.head_collection(second), other):
-        assert not collection.hide_viewport and not collection.hide_render
+        assert not shown[collection.name].hide_viewport and not collection.hide_render
+    addon.context.view_layer.update()
+    assert not first.visible_get()
+    shown[old.name].hide_viewport = False  # its eye in the outliner brings it back
+    addon.context.view_layer.update()
+    assert first.visible_get()
 
 
 def test_a_head_that_an_artist_keeps_elsewhere_is_hidden_and_nothing_else(built, addon, scan_object):
