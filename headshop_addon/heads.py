@@ -136,7 +136,7 @@ def skin_of(obj) -> bpy.types.Object | None:
 def head_collection(skin: bpy.types.Object) -> bpy.types.Collection | None:
     """The collection that was made for a head, or None if none of its objects is in it any more."""
     holders = (c for obj in (skin, *_objects_of(skin)) for c in obj.users_collection)
-    return next((c for c in holders if c.get(PART) == COLLECTION), None)
+    return next((c for c in holders if c.get(PART) == COLLECTION or c.name == head_name(skin)), None)
 
 
 def stands_with(skin: bpy.types.Object) -> list[bpy.types.Object]:
@@ -235,25 +235,30 @@ def read_head(skin: bpy.types.Object) -> Head:
 
 
 def lacking(skin: bpy.types.Object) -> str:
-    """What is wrong with a head that has lost parts or never had them, and what to do; empty for a whole one."""
+    """What is wrong with a head that has lost parts, never had them or was given other vertices, and what to do; empty for a
+    whole one."""
     objects = parts_of(skin)
-    absent = ", ".join(part for part in PARTS if part not in objects)
-    if not absent:
+    if absent := ", ".join(part for part in PARTS if part not in objects):
+        return (
+            f"The head {skin.name!r} has no {absent}: undo their deletion, append the head again, or duplicate it with all "
+            "its children (Select, Select Grouped, Children)."
+        )
+    return next(filter(None, map(_other_vertices, objects.values())), "")
+
+
+def _other_vertices(obj) -> str:
+    count = len(obj.data.vertices)
+    expected = obj.get(COUNT, count)
+    if count == expected:
         return ""
     return (
-        f"The head {skin.name!r} has no {absent}: undo their deletion, append the head again, or duplicate it with all its "
-        "children (Select, Select Grouped, Children)."
+        f"{obj.name!r} has {count} vertices instead of {expected}: its mesh may be reshaped but not be given other vertices; "
+        "undo that or build the head again."
     )
 
 
 def _read_part(skin, obj):
     mesh = bridge.object_to_mesh(obj)
-    expected = obj.get(COUNT, len(mesh.vertices))
-    if len(mesh.vertices) != expected:
-        raise InputError(
-            f"{obj.name!r} has {len(mesh.vertices)} vertices instead of {expected}: its mesh may be reshaped but not "
-            "be given other vertices; undo that or build the head again."
-        )
     matrix = placement(skin, obj)
     if np.array_equal(matrix, np.eye(4)):
         return mesh

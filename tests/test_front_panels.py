@@ -261,3 +261,16 @@ def test_a_running_job_is_shown_once(addon, reference, panel):
         assert [name for name in drawn if "Some Job: 42%" in drawn[name]] == [f"HEADSHOP_PT_{panel}"]
     finally:
         jobs.running = None
+
+
+def test_a_part_with_other_vertices_is_named_where_its_sliders_are(addon, reference):
+    from headshop.headshop_addon import heads
+
+    heads.create_head(reference, "Ref")
+    skin = heads.find_heads()[0]
+    assert "instead of" not in " ".join(draw_all(addon)["HEADSHOP_PT_muscles"])
+    addon.context.view_layer.objects.active = skin
+    skin.select_set(True)
+    addon.ops.object.convert(target="MESH")  # which applies the subdivision
+    said = " ".join(draw_all(addon)["HEADSHOP_PT_muscles"])
+    assert f"'Ref Skin' has {len(skin.data.vertices)} vertices instead of" in said and "build the head again" in said
