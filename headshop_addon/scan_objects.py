@@ -189,14 +189,14 @@ def select(context, obj: bpy.types.Object) -> None:
 
 
 def look_at(context) -> None:
-    """Turn the viewport to the front of what is selected and close to it; nothing without a window."""
+    """Turn the viewport to the front of what is selected and close to it, all four of a quad view; nothing without a window."""
     area = context.area
     if bpy.app.background or area is None or area.type != "VIEW_3D":
         return
     region = next(region for region in area.regions if region.type == "WINDOW")
     with context.temp_override(area=area, region=region):
         bpy.ops.view3d.view_axis(type="FRONT")
-        bpy.ops.view3d.view_selected()
+        bpy.ops.view3d.view_selected(use_all_regions=True)
 
 
 def summary(scan: bpy.types.Object) -> str:

@@ -2,6 +2,8 @@
 """An object in the scene becomes the scan as the viewport shows it: with modifiers, shape keys, its scale, mirrored or not."""
 
 import json
+from contextlib import nullcontext
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -226,3 +228,15 @@ def test_the_field_offers_the_scans_and_heads_of_this_scene(addon, skin_object, 
     assert mesh in list(addon.data.objects) and offered == [[scan], [skin]]
     other = addon.data.scenes.new("Other").headshop
     assert not any(properties._is_scan(other, obj) or properties._is_skin(other, obj) for obj in addon.data.objects)
+
+
+def test_every_view_of_a_quad_view_comes_close_to_a_scan(blender, monkeypatch):
+    from headshop.headshop_addon import scan_objects
+
+    seen = []
+    view3d = SimpleNamespace(view_axis=lambda **_: None, view_selected=lambda **how: seen.append(how))
+    pretended = SimpleNamespace(app=SimpleNamespace(background=False), ops=SimpleNamespace(view3d=view3d))
+    monkeypatch.setattr(scan_objects, "bpy", pretended)
+    area = SimpleNamespace(type="VIEW_3D", regions=[SimpleNamespace(type="WINDOW")])
+    scan_objects.look_at(SimpleNamespace(area=area, temp_override=lambda **_: nullcontext()))
+    assert seen == [{"use_all_regions": True}]
