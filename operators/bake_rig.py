@@ -7,8 +7,7 @@ from ..headshop_addon.bake_job import BakeJob
 
 
 class HEADSHOP_OT_bake_rig(BakeJob, bpy.types.Operator):
-    """A shape key for every muscle and control whose value is its slider, and drivers that make them play the
-    simulation together, also without this extension"""
+    """Shape keys as sliders of all muscles and controls, with drivers that play the simulation, without this extension too"""
 
     bl_idname = "headshop.bake_rig"
     bl_label = "Bake Rig"

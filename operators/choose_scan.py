@@ -8,8 +8,7 @@ from ..headshop_addon.jobs import Job
 
 
 class HEADSHOP_OT_choose_scan(Job, bpy.types.Operator):
-    """Take a cleaned, upright copy of the selected meshes or point clouds as the scan, in the same place; or choose a scan,
-    with its landmarks"""
+    """Take a clean, upright copy of the selected meshes or points as the scan; or choose another scan, with its landmarks"""
 
     bl_idname = "headshop.choose_scan"
     bl_label = "Use Selected Objects"

@@ -76,6 +76,11 @@ def test_every_operator_file_holds_the_operator_it_is_named_after(addon):
         assert ("UNDO" in cls.bl_options) is not writes_only
 
 
+def test_tooltips_are_not_broken_into_lines_as_the_code_is(addon):
+    said = {name: getattr(addon.ops.headshop, name).get_rna_type().description for name in dir(addon.ops.headshop)}
+    assert all(said.values()) and [name for name, text in said.items() if "\n" in text] == []
+
+
 def test_every_button_is_grey_with_a_reason_in_an_empty_scene(addon):
     from headshop import operators
 
