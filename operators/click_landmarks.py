@@ -62,8 +62,6 @@ class HEADSHOP_OT_click_landmarks(bpy.types.Operator):
             self._finish(context)
             self.report({"ERROR"}, f"{self._scan.name} is in a collection that is hidden or excluded: show that first.")
             return {"CANCELLED"}
-        if context.space_data.local_view:
-            self._scan.local_view_set(context.space_data, True)
         context.window.cursor_modal_set("CROSSHAIR")
         context.window_manager.modal_handler_add(self)
         self._ask(context)
@@ -114,6 +112,8 @@ class HEADSHOP_OT_click_landmarks(bpy.types.Operator):
         self._hidden = scan.hide_viewport
         scan.hide_viewport = False
         scan.hide_set(False)
+        if context.space_data.local_view and scan.name in context.view_layer.objects:
+            scan.local_view_set(context.space_data, True)
         parts = [obj for skin in heads.built_from(context.scene, scan) for obj in heads.stands_with(skin)]
         self._covered = [obj.name for obj in parts if not obj.hide_viewport]
         for name in self._covered:

@@ -134,6 +134,18 @@ def test_a_scan_in_an_excluded_collection_is_not_clicked(clicks, context, addon)
     assert clicks.said == [f"{clicks._scan.name} is in a collection that is hidden or excluded: show that first."]
 
 
+def test_the_scan_comes_into_local_view(clicks, context):
+    entered = []
+    context.view_layer.update()
+    clicks._scan = SimpleNamespace(name=clicks._scan.name, hide_viewport=True, hide_set=lambda _: None)
+    clicks._scan.local_view_set = lambda *how: entered.append(how)
+    clicks._show_alone(context)
+    assert not entered
+    context.space_data.local_view = context.space_data
+    clicks._show_alone(context)
+    assert entered == [(context.space_data, True)]
+
+
 def test_it_does_not_begin_in_edit_mode(addon, scan_object):
     addon.context.view_layer.objects.active = scan_object
     assert addon.ops.headshop.click_landmarks.poll()
