@@ -10,7 +10,9 @@ from ..sim.anatomy.landmark_names import label
 
 _SKIP = {"RIGHTMOUSE", "N"}
 _LEAVE_OUT = {"X", "DEL"}  # by which Blender deletes the selected objects
-_WORKSPACE = {"PAGE_UP", "PAGE_DOWN"}  # with Ctrl another one is shown; what the status bar says would stay in this one
+#: With Ctrl they show another workspace, while what the status bar says stays in this one, or save the file, and with it heads
+#: hidden that make way for the scan.
+_LEAVE = {"PAGE_UP", "PAGE_DOWN", "S"}
 _END = {"ESC", "RET", "NUMPAD_ENTER"}
 
 
@@ -75,7 +77,7 @@ class HEADSHOP_OT_click_landmarks(bpy.types.Operator):
             return {"FINISHED"}
         if event.type in _END and event.value == "PRESS":
             return self._end(context)
-        if event.type in _WORKSPACE and event.ctrl and event.value == "PRESS":
+        if event.type in _LEAVE and (event.ctrl or event.oskey) and event.value == "PRESS":
             return self._end(context) | {"PASS_THROUGH"}
         if event.type == "Z" and (event.ctrl or event.oskey) and event.value == "PRESS":
             self._take_back(context)

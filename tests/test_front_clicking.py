@@ -116,10 +116,20 @@ def test_clicking_ends_where_the_scan_is_deleted_or_edited(clicks, context, addo
     assert clicks.modal(context, _press("LEFTMOUSE")) == {"FINISHED"} and len(clicks.said) == 2
 
 
-def test_clicking_ends_where_the_scan_is_hidden_and_when_another_workspace_is_shown(clicks, context):
-    clicks._before, clicks._covered, clicks._name = None, [], "prn"
-    assert clicks.modal(context, _press("PAGE_DOWN", ctrl=True)) == {"FINISHED", "PASS_THROUGH"}
-    assert clicks.modal(context, _press("PAGE_DOWN")) == {"PASS_THROUGH"}
+@pytest.mark.parametrize("key", ["PAGE_DOWN", "S"])
+def test_the_head_is_back_before_the_file_is_saved_or_another_workspace_shown(clicks, context, reference, key):
+    from headshop.headshop_addon import heads
+
+    heads.create_head(reference, "Ref", clicks._scan)
+    (skin,) = heads.find_heads()
+    clicks._before, clicks._name = None, "prn"
+    clicks._show_alone(context)
+    assert clicks.modal(context, _press(key)) == {"PASS_THROUGH"} and skin.hide_viewport
+    assert clicks.modal(context, _press(key, ctrl=True)) == {"FINISHED", "PASS_THROUGH"} and not skin.hide_viewport
+
+
+def test_clicking_ends_where_the_scan_is_hidden(clicks, context):
+    clicks._covered, clicks._name = [], "prn"
     clicks._scan.hide_set(True)
     assert clicks.modal(context, _press("LEFTMOUSE")) == {"FINISHED"} and "hidden" in clicks.said[-1]
 
