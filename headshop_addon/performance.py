@@ -25,7 +25,8 @@ PERFORMANCE = "headshop_performance"
 TOLERANCE = 0.02
 ITERATIONS = 60  # a frame begins where the one before ended, so little is left to do
 MET = 0.1  # mm: the last step of the solver at which a frame in motion counts as converged
-#: Frames, seven minutes of film: their motion, and the matrix of frames by frames that compresses it, take about 8 GB.
+#: Frames, seven minutes of film: their motion, and the matrix of frames by frames that compresses it, take some 8 GB, as
+#: reckoned from the sizes of these arrays.
 MOST = 10_000
 _PATHS = {"headshop.muscles.": "muscles", "headshop.controls.": "controls"}
 

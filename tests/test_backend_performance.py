@@ -170,7 +170,6 @@ def test_keyed_sliders_become_poses(bpy, skin, performance):
 def test_a_simulated_performance_plays_without_the_extension(
     bpy, skin, performance, tmp_path, reference_model, monkeypatch
 ):
-
     monkeypatch.setattr("headshop.sim.tissue.model.build_model", lambda head: reference_model)
 
     poses = [Pose({"zygomaticus_major_l": k / 4}, jaw_open=k / 8) for k in range(5)]

@@ -111,3 +111,14 @@ def test_modifiers_of_a_hidden_scan_count(addon, scan_object, reference, tmp_pat
 def _make_larger(scan):
     wave = scan.modifiers.new("Larger", "DISPLACE")
     wave.direction, wave.strength, wave.mid_level = "Z", 0.012, 0.0
+
+
+def test_the_collection_of_a_head_that_was_built_before_these_were_marked_is_known_by_its_name(addon, reference):
+    from headshop.headshop_addon import heads
+
+    collection = heads.create_head(reference, "Somebody")
+    del collection[heads.PART]
+    (skin,) = heads.find_heads()
+    assert heads.head_collection(skin) == collection
+    collection.name = "Hero"
+    assert heads.head_collection(skin) is None
